@@ -61,12 +61,31 @@ def test_a_model_with_the_other_sign_is_said(tmp_path: Path) -> None:
     assert "friction" not in result.stdout
 
 
-def test_an_import_names_the_column_of_the_model(tmp_path: Path) -> None:
+@pytest.mark.parametrize("way", ["import", "option"])
+def test_a_column_of_another_name_is_named(tmp_path: Path, way: str) -> None:
     run, profile = arm(tmp_path)
     foreign = tmp_path / "foreign.csv"
     foreign.write_text(run.read_text().replace("predicted_torque", "tau_model"))
-    out = tmp_path / "imported"
-    column = "predicted_torque=tau_model"
-    assert invoke("import", foreign, "--column", column, "--yes", "-o", out).exit_code == 0
-    result = invoke("diagnose", out / "foreign.csv", "-p", profile)
+    options: tuple[str, ...] = ("--predicted", "motor_torque=tau_model")
+    if way == "import":
+        out, column = tmp_path / "imported", "predicted_torque=tau_model"
+        assert invoke("import", foreign, "--column", column, "--yes", "-o", out).exit_code == 0
+        foreign, options = out / "foreign.csv", ()
+    result = invoke("diagnose", foreign, "-p", profile, *options)
     assert "friction in proportion to the\nload" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("motor_torque=tau", "no column 'tau'"),
+        ("tension=predicted_torque", "write motor_torque=COLUMN"),
+        ("motor_torque", "write motor_torque=COLUMN"),
+        ("motor_torque=motor_angle", "a unit of angle, not of torque"),
+    ],
+)
+def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, words: str) -> None:
+    run, profile = arm(tmp_path)
+    result = invoke("compare", run, "-p", profile, "--predicted", given)
+    assert result.exit_code in {2, 3}
+    assert words in result.stderr

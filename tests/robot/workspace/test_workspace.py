@@ -157,6 +157,7 @@ def test_a_grid_of_nothing_is_refused(step: float, box: object, words: str) -> N
         (["cabtve", "--tension", "5N", "80N"], "there is no profile 'cabtve'"),
         (["cabtive", "--tension", "80N", "5N"], "low 80.0 N is not below high 5.0 N"),
         (["cabtive", "--tension", "5N", "80N", "--of", "clear"], "the conditions here are"),
+        (["hanging-4", "--tension", "5N", "200N", "--force", "9N"], "leave --force and --moment"),
         (["cabtive", "--tension", "5N", "80N", "--from", "yaw=3deg"], "the box has x, y and z"),
     ],
 )

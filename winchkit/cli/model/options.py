@@ -51,6 +51,11 @@ def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
 
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+    click.option(
+        "--predicted",
+        metavar="OUTPUT=COLUMN",
+        help="Column of another model's prediction: motor_torque=tau_model.",
+    ),
     click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
     click.option(
         "--effects",
@@ -72,6 +77,7 @@ class Asked:
     effect_files: Sequence[str]
     winch: str | None
     band: float | None
+    predicted: str | None = None
 
     @property
     def source(self) -> Path:
@@ -102,8 +108,15 @@ class Asked:
         Raises FileError with the faults of all files.
         """
         if declared is not None and wings.call("compare", declared) is not None:
+            if self.predicted is not None:
+                raise UsageError("--predicted: is of one winch or axis, not of a robot")
             return read_all(paths)
-        return read_runs(paths, self.winch)
+        runs = read_runs(paths, self.winch)
+        if self.predicted is None:
+            return runs
+        from winchkit.runs.predicted import with_prediction
+
+        return [with_prediction(run, self.predicted) for run in runs]
 
     def placed(self, effect: str, declared: WinchProfile | RobotProfile) -> str:
         """``EFFECT/LINE`` where --winch names a line of a robot."""
@@ -114,7 +127,9 @@ class Asked:
 
     @property
     def each(self) -> bool:
-        """Whether every winch of the runs is asked for by itself."""
+        """Whether every winch of the runs is asked for by itself. Raises UsageError."""
+        if self.winch == ALL and self.predicted is not None:
+            raise UsageError("--predicted: is of one winch; name it by --winch")
         return self.winch == ALL
 
     @property
@@ -123,6 +138,7 @@ class Asked:
         out = [word for path in self.effect_files for word in ("--effects", path)]
         out += [] if self.winch is None else ["--winch", self.winch]
         out += [] if self.band is None else ["--band", f"{self.band:g}"]
+        out += [] if self.predicted is None else ["--predicted", self.predicted]
         return tuple(out)
 
 
@@ -155,9 +171,10 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
         effect_files: Sequence[str],
         winch: str | None,
         band: float | None,
+        predicted: str | None,
         **others: Any,
     ) -> Any:
-        return function(asked=Asked(profile, effect_files, winch, band), **others)
+        return function(asked=Asked(profile, effect_files, winch, band, predicted), **others)
 
     for option in _MODEL_OPTIONS:
         bundled = option(bundled)

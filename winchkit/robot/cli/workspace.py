@@ -109,6 +109,11 @@ def command(
         "tension": None if not tension else [quantity(one, "force") for one in tension],
     }
     model, demand = _demanded(robot, bench, {k: v for k, v in given.items() if v is not None})
+    if model.hangs and (force or moment):
+        raise UsageError(
+            f"robot '{model.profile.name}' hangs on {len(model.names)} cables, which hold its "
+            "weight at rest only: leave --force and --moment out"
+        )
     grid = grid_of(
         model, optional(step, "length"), _box(model, start, end), optional(turn, "angle") or 0.0
     )

@@ -1,0 +1,32 @@
+"""The torque or force that another model predicts, as the channel of a run that the model reads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from winchkit.errors import Fault, RunError, UsageError
+from winchkit.runs.columns import unit_fault
+from winchkit.runs.run import CHANNEL_DIMENSIONS, Channel, Run
+from winchkit.units import factor
+
+OF_OUTPUT = {"motor_torque": "predicted_torque", "force": "predicted_force"}
+"""Channel of the prediction by the output that another model predicts."""
+
+
+def with_prediction(run: Run, given: str) -> Run:
+    """The run with a column as the prediction of an output: ``motor_torque=tau_model``.
+
+    Raises UsageError for another output; RunError without the column, or with another unit.
+    """
+    output, _, column = given.partition("=")
+    if output not in OF_OUTPUT or not column:
+        raise UsageError(
+            f"--predicted: '{given}' names no prediction; write motor_torque=COLUMN, of a linear "
+            "axis force=COLUMN"
+        )
+    values, channel = run[column], OF_OUTPUT[output]
+    unit, dimension = run.channels[column].unit, CHANNEL_DIMENSIONS[channel]
+    if fault := unit_fault(column, unit, dimension):
+        raise RunError(Fault(fault, run.path or run.name))
+    shown = Channel(values * factor(unit, dimension), unit, run.channels[column].column)
+    return replace(run, channels={**run.channels, channel: shown})
