@@ -34,11 +34,12 @@ VECTOR = "rotation vector"
 
 _OF_A_WINCH = {
     **{"motor_angle": "angle", "motor_velocity": "angular speed"},
-    **{"motor_torque": "torque", "motor_current": "current"},
+    **{"motor_torque": "torque", "motor_current": "current", "predicted_torque": "torque"},
     **dict.fromkeys(("tension", "tension_gross", "load", "load_gross"), "force"),
     **{"cable_length": "length", "cable_length_gross": "length"},
     **{"temperature": "temperature", "swivel": "angle"},
-    **{"position": "length", "velocity": "speed", "force": "force"},
+    **{"position": "length", "velocity": "speed"},
+    **dict.fromkeys(("force", "predicted_force"), "force"),
 }
 CHANNELS: dict[str, str] = {
     "time": "time",

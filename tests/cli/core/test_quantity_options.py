@@ -64,7 +64,8 @@ def test_every_quantity_of_the_command_tree_has_the_type() -> None:
 @pytest.mark.parametrize(("words", "parameter"), PLAIN, ids=[f"{w} {naming(p)}" for w, p in PLAIN])
 def test_a_wrong_unit_names_the_option(words: str, parameter: click.Parameter) -> None:
     name = naming(parameter)
-    given = [f"{name}={WRONG}"] if isinstance(parameter, click.Option) else ["A", WRONG]
+    values = [WRONG] * parameter.nargs
+    given = [name, *values] if isinstance(parameter, click.Option) else ["A", *values]
     result = run(*words.split(), *given)
     assert result.exit_code == 2
     assert name in result.stderr

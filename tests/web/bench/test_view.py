@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import re
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -284,7 +286,7 @@ def test_the_page_saves_a_trip_until_its_reset(tmp_path: Path) -> None:
     bench = tmp_path / "bench.toml"
     bench.write_text(BENCH)
     view = BenchView(str(bench), allow_motion=False, folder=tmp_path)
-    refusals = {WinchkitError: _refused}
+    refusals = {WinchkitError: partial(_refused, SimpleNamespace(words=str))}
     with TestClient(Starlette(routes=view.routes(), exception_handlers=refusals)) as client:
         assert "not attached yet" in client.get("/api/bench/trip.csv").json()["error"]
         view._watcher = station = Watching()  # type: ignore[assignment]

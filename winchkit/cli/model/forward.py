@@ -17,8 +17,8 @@ from winchkit.cli.core.terminal import progress_bar
 @click.command(
     cls=Command,
     examples=(
-        "winchkit forward better.toml --programme programme-demo -o forward.csv",
         "winchkit forward better.toml --torque demo-10kg-1.csv -o forward.csv",
+        "winchkit forward better.toml --torque demo-20kg-1.csv -o forward-20kg.csv",
     ),
 )
 @click.argument("profile", type=PROFILE)
@@ -33,7 +33,7 @@ from winchkit.cli.core.terminal import progress_bar
     help="Mass on the cable; by default that of the run or the programme.",
 )
 @click.option(
-    "--initial-speed", metavar="SPEED", help="Speed at the start; by default that of the run."
+    "--initial-speed", metavar="VALUE", help="Speed at the start; by default that of the run."
 )
 @click.option(
     "--rate",

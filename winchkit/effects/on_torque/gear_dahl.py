@@ -6,23 +6,23 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Dynamics, Effect, Parameter, Plausible, Values
 from winchkit.effects.presliding import START
 from winchkit.model.friction import dahl
-from winchkit.model.recurrence import share
 from winchkit.model.stages import At, Stage
 
 
-def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque τ η^(−z) with the state z, from −1 paying out to 1 winding in."""
-    if values["efficiency"] == 1.0:
-        return torque
+def _state(at: At, values: Values) -> Array:
+    """State z, from −1 paying out to 1 winding in."""
     wound_in = at.wound_angle * at.profile.gearbox.ratio
-    state = dahl(wound_in, np.ones_like(torque), 1 / values["distance"], start=values["start"])
-    return np.asarray(torque * values["efficiency"] ** -state)
+    return dahl(wound_in, np.ones(len(wound_in)), 1 / values["distance"], start=values["start"])
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque τ η^(−z)."""
+    return np.asarray(torque * values["efficiency"] ** -_state(at, values))
 
 
 def carry(after: Array, before: Array, at: At, values: Values) -> Array:
     """State z at the last sample, the ``start`` of the next ones."""
-    ratio = share(after[-1], before[-1], 1.0)
-    return share(-np.log(ratio), np.log(values["efficiency"]))
+    return _state(at, values)[-1]
 
 
 def _at_state(torque: Array, at: At, values: Values) -> Array:

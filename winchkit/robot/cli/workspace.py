@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_bench
 from winchkit.cli.core.options import PROFILE, output_option
 from winchkit.cli.core.output import echo_json
@@ -30,7 +30,6 @@ _SLICES = 12
     examples=(
         "winchkit workspace cabtive --tension '5 N' '80 N'",
         "winchkit workspace cabtive --tension '5 N' '80 N' --turn '10 deg' -o cabtive.ply",
-        Example("winchkit workspace -b robot.toml", "needs a bench with a robot"),
     ),
 )
 @click.argument("robot", required=False, type=PROFILE)
