@@ -204,9 +204,9 @@ class Workspace:
 
     def view(self) -> dict[str, Any]:
         """The state as the page shows it."""
-        work = self._work
+        work, refusals = self._work, self._refusals  # before the state: it has their words
         busy = None if work is None else {"what": work.what, "share": work.share}
-        return self._state.to_json() | {"busy": busy, "refusals": self._refusals}
+        return self._state.to_json() | {"busy": busy, "refusals": refusals}
 
     def side(self, beside: bool = False) -> PageState:
         """The present state or that beside it; raises UsageError without one."""
@@ -361,8 +361,8 @@ class Workspace:
             self.changed()
 
     def _refuse(self, *faults: str) -> None:
-        self._refusals += 1
         self._set(faults=faults)
+        self._refusals += 1
 
     def _set(self, **changes: Any) -> None:
         if changes.keys() & {"answer", "runs", "versions"}:
@@ -405,8 +405,8 @@ class Workspace:
         self._loaded(runs, [])
 
     def _loaded(self, runs: Sequence[LoadedRun], faults: Sequence[str]) -> None:
-        self._refusals += bool(faults)
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
+        self._refusals += bool(faults)
         if runs and self._state.versions:
             if sum(len(item.run.time) for item in runs) > _LONG:
                 recorded = recorded_curves(self._state.winch_runs()[1])

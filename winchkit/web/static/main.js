@@ -23,8 +23,10 @@ function route() {
   main.removeAttribute("data-signature");
   main.replaceChildren();
   views[name].enter(main, state);
-  place();
 }
+
+// A view may draw itself anew at any time: a message that stood in it is put where it is seen.
+new MutationObserver(place).observe(main, { childList: true, subtree: true });
 
 // Refusals of work under way, in every view; each is shown once.
 let refusal = 0;
@@ -39,7 +41,7 @@ socket("/live", (fresh) => {
   state = fresh;
   version.text = fresh.version;
   refused(state);
-  if (first) bench.station(state).finally(route); else if (name) { views[name].update(state); place(); }
+  if (first) bench.station(state).finally(route); else if (name) views[name].update(state);
 }, () => { if (!state || !state.bench) alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew.", "server"); });
 
 // Messages stand above a dialog, and a dialog below them.
