@@ -22,7 +22,7 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 
 def carry(after: Array, before: Array, at: At, values: Values) -> Array:
     """State z at the last sample, the ``start`` of the next ones."""
-    return _state(at, values)[-1]
+    return np.asarray(_state(at, values)[-1])
 
 
 def _at_state(torque: Array, at: At, values: Values) -> Array:
