@@ -15,7 +15,7 @@ def test_an_extent_and_its_bound_are_shares_of_the_range() -> None:
     shares = [share for share in declared.grid if share * extent < declared.high]
     assert 0 < len(shares) < len(declared.grid), "a longer distance is no presliding"
     assert found.grid == pytest.approx([share * extent for share in shares])
-    assert found.low == pytest.approx(found.grid[0] / 100)
+    assert found.low == pytest.approx(found.grid[0] / 10)
 
 
 def test_a_place_keeps_its_bounds_and_other_effects_are_unchanged() -> None:

@@ -11,7 +11,7 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.model.stages import At
 from winchkit.model.variables import VARIABLES
 
-_BELOW = 0.01
+_BELOW = 0.1
 """Smallest extent over that of the grid."""
 
 
