@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import openpyxl
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from mcap.writer import Writer
 from scipy.io import savemat
@@ -23,6 +21,9 @@ from winchkit.runs.importing.mapping import guess_by, mapping_of
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
 from winchkit.runs.run import Run
+
+pa = pytest.importorskip("pyarrow")
+pq = pytest.importorskip("pyarrow.parquet")
 
 NAMES = {"q": "motor_angle", "dq": "motor_velocity", "tau": "motor_torque"}
 UNITS = {"q": "deg", "dq": "rpm", "tau": "mN m"}
