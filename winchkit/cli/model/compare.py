@@ -61,7 +61,6 @@ def command(
     reference_angle by the loops of [control].
     """
     from winchkit.diagnosis.compare import WinchCompared, compared
-    from winchkit.dynamics.comparison import simulated_errors
     from winchkit.report.pages.pages import comparison_figures, comparison_html
     from winchkit.report.reproducibility import Command
     from winchkit.report.simulated import simulated_figures, simulated_text
@@ -81,6 +80,8 @@ def command(
         answer = compared(own, declared, asked.catalogue, asked.band)
         errors: list[SimulatedError] = []
         if is_simulated and isinstance(declared, WinchProfile):
+            from winchkit.dynamics.comparison import simulated_errors
+
             progress("simulating the motion", None)
             errors = simulated_errors(own, declared, asked.catalogue)
     simulated = {"simulated": [error.to_json() for error in errors]} if errors else {}

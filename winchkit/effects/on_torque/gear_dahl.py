@@ -4,6 +4,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Dynamics, Effect, Parameter, Plausible, Values
+from winchkit.effects.on_torque.gear_efficiency import EFFICIENCY
 from winchkit.effects.presliding import START
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
@@ -39,15 +40,7 @@ EFFECT = Effect(
     id="gear-dahl",
     stage=Stage.GEARBOX,
     parameters=(
-        Parameter(
-            "efficiency",
-            "1",
-            null=1.0,
-            typical=0.9,
-            low=0.05,
-            high=1.0,
-            plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
-        ),
+        EFFICIENCY,
         Parameter(
             "distance",
             "rad",

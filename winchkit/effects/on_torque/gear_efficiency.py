@@ -11,19 +11,21 @@ def apply(torque: Array, at: At, values: Values) -> Array:
     return torque * values["efficiency"] ** -cable_direction(at, values)
 
 
+EFFICIENCY = Parameter(
+    "efficiency",
+    "1",
+    null=1.0,
+    typical=0.9,
+    low=0.05,
+    high=1.0,
+    plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
+)
+"""Output power over input power of a gear."""
 EFFECT = Effect(
     id="gear-efficiency",
     stage=Stage.GEARBOX,
     parameters=(
-        Parameter(
-            "efficiency",
-            "1",
-            null=1.0,
-            typical=0.9,
-            low=0.05,
-            high=1.0,
-            plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
-        ),
+        EFFICIENCY,
         CABLE_TRANSITION,
     ),
     apply=apply,
