@@ -41,8 +41,10 @@ def answer(runs: Sequence[Path], profile: Path, limit: float) -> dict[str, Any]:
     begun, text = time.process_time(), ""
     told: dict[str, Any] = {}
     try:
+        read = [read_run(path) for path in runs]  # unlimited: a stop while a file opens leaks it
+        declared = read_profile(profile)
         with _limited(limit):
-            said = diagnose([read_run(path) for path in runs], read_profile(profile))
+            said = diagnose(read, declared)
             told = said.diagnosis.to_json()
             verdict = told["verdict"]
     except TimeLimit:
