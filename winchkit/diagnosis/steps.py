@@ -56,15 +56,14 @@ def steps_of(
     own = estimates(regression, final, spread)[engine.n_initial_terms :]
     covariance = value_covariance(regression, final, noise)
     for every, gain, (term, values) in zip(sets, _gains(engine, final, noise), own, strict=True):
+        further = every.effects[_MOST_ALTERNATIVES:]
+        equivalence = every.only(every.effects[:_MOST_ALTERNATIVES])
         parameters = {
             member.effect.id: values
             if member.effect.id == term.effect.id
             else _values_of_rival(engine, result, fitted, member.effect.id)
-            for member, fitted in zip(every.terms, every.fits, strict=True)
+            for member, fitted in zip(equivalence.terms, equivalence.fits, strict=True)
         }
-        further = every.effects[_MOST_ALTERNATIVES:]
-        equivalence = every.only(every.effects[:_MOST_ALTERNATIVES])
-        parameters = {name: parameters[name] for name in equivalence.effects}
         combination = combination_of_set(equivalence.terms, parameters, dataset)
         if combination is None and equivalence.term.effect.id == term.effect.id:
             combination = combination_of_term(term, covariance)
@@ -215,9 +214,10 @@ def _values_of_rival(
     regression, noise = engine.regression, result.noise
     # The reported model may have other weights than those of the comparison.
     fitted = engine.refit(fitted.hypothesis, noise)
-    spread = spread_of(regression, fitted, noise, regression.blocks)
-    found = estimates(regression, fitted, spread)
-    return next(values for term, values in reversed(found) if term.effect.id == effect)
+    ids = [term.effect.id for term in fitted.hypothesis.terms]
+    index = len(ids) - 1 - ids[::-1].index(effect)
+    spread = spread_of(regression, fitted, noise, regression.blocks, index)
+    return estimates(regression, fitted, spread)[index][1]
 
 
 def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:

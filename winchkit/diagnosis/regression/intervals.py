@@ -56,21 +56,30 @@ _MOST_STRETCHED = 4.0
 
 
 def profile_ends(
-    regression: Regression, fit: Fit, inverse_sigma: Array, covariance: Array, reach: Array
+    regression: Regression,
+    fit: Fit,
+    inverse_sigma: Array,
+    covariance: Array,
+    reach: Array,
+    *,
+    term: int | None = None,
 ) -> tuple[Array, Array]:
-    """Ends of profile-likelihood intervals of the effects' unknowns.
+    """Ends of profile-likelihood intervals of the unknowns of one term, or of all effects.
 
-    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``covariance``: covariance of the
-    linearised fit, shape (n_unknowns, n_unknowns). ``reach``: square root of the rise of χ² at the
-    ends, shape (n_unknowns,). Returns: (n_unknowns,).
+    The other unknowns have the ends of the linearised fit. ``inverse_sigma``: 1/σ of every row,
+    shape (n_rows,). ``covariance``: covariance of the linearised fit, shape (n_unknowns,
+    n_unknowns). ``reach``: square root of the rise of χ² at the ends, shape (n_unknowns,). Returns:
+    (n_unknowns,).
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
     bounds = regression.bounds(fit.hypothesis)
     first = regression.nuisance_columns.shape[1]
     states = sum(len(start) for start in fit.hypothesis.starts)
+    every = np.ones(len(fit.vector), dtype=bool)
+    own = every if term is None else regression.unknowns_of(term, fit.hypothesis)
     for index in range(first, len(fit.vector) - states):
-        if deviation[index] > 0.0:
+        if deviation[index] > 0.0 and own[index]:
             profile = _Profile(regression, fit, inverse_sigma, covariance, index)
             low[index] = fit.vector[index] - profile.length(-1.0, reach[index])
             high[index] = fit.vector[index] + profile.length(1.0, reach[index])
@@ -160,8 +169,13 @@ def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
     return np.asarray(fit.jacobian * noise.inverse_sigma(regression)[:, None])
 
 
-def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
-    """Standard deviations and 95 % intervals of every unknown."""
+def spread_of(
+    regression: Regression, fit: Fit, noise: Noise, blocks: Folds, term: int | None = None
+) -> Spread:
+    """Standard deviations and 95 % intervals of every unknown.
+
+    Intervals follow the profile of χ² for one term, or by default for all effects.
+    """
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = whitened_jacobian(regression, fit, noise)
     covariance_by_likelihood = inverse_normal(whitened)
@@ -185,7 +199,9 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
-    low, high = profile_ends(regression, fit, inverse_sigma, covariance, HALF_WIDTH * wider)
+    low, high = profile_ends(
+        regression, fit, inverse_sigma, covariance, HALF_WIDTH * wider, term=term
+    )
     below, above = (
         np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )

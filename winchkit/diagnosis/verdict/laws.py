@@ -50,7 +50,7 @@ def _with_simpler_laws(
         if not term.effect.reduces_to:
             continue
         simpler = settled(with_simpler_law(engine, present, noise, index))
-        spread = spread_of(engine.regression, present, noise, engine.regression.blocks)
+        spread = spread_of(engine.regression, present, noise, engine.regression.blocks, index)
         values = estimates(engine.regression, present, spread)[index][1]
         if (
             reduced_law(term, values, engine.profile)
