@@ -41,6 +41,14 @@ _EXCHANGED = 2
 """Largest number of additions of which one may be exchanged for a pair."""
 _PAIRS = 3
 """Pairs that are fitted; computing cost, rule of thumb."""
+_REST = 0.01
+"""Share of the excess before, in the outputs of an addition, that counts as the rest of the others;
+rule of thumb: a tenth of what the verdict ``explained`` leaves."""
+_REST_ERROR = 2.0
+"""The same for the largest error there, in units of the noise; rule of thumb."""
+_LEFT_OF_REST = 0.5
+"""What an addition may leave of such a rest, over what it explains of it; screened: effects that
+were there left up to 0.43, imitations at least 0.82."""
 _LACK_OF_FIT_LEVEL = 0.02
 """Level of the lack-of-fit test after Bonferroni; convention."""
 _SCORE_LEVEL = 0.99
@@ -141,6 +149,7 @@ def _forward_selection(
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """Model with all accepted effects, its noise, and the fits of the first candidates."""
     tried: tuple[Fit, ...] = ()
+    initial = present
     seen: set[tuple[str, ...]] = set()
     while present.labels not in seen:
         seen.add(present.labels)
@@ -154,7 +163,7 @@ def _forward_selection(
                 larger = best_accepted(engine, present, noise, trials)
             tried = tried or _fits(trials)
         larger = larger or _best_pair(engine, present, noise)
-        if larger is None:
+        if larger is None or _imitates_rest(engine, initial, present, larger, noise):
             break
         engine.update_signatures(larger.hypothesis)
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
@@ -163,6 +172,27 @@ def _forward_selection(
             break
         scores = engine.scores(present, noise)
     return present, noise, tried
+
+
+def _imitates_rest(
+    engine: SelectionEngine, initial: Fit, present: Fit, larger: Fit, noise: Noise
+) -> bool:
+    """Whether a larger model's addition imitates what the laws of the present effects leave.
+
+    Where they leave a hundredth of the excess, in the outputs of the addition, and errors of the
+    size of the noise, the addition has to explain two thirds of it.
+    """
+    added = [t.effect for t in larger.hypothesis.terms if t.label not in present.labels]
+    own = set().union(*(engine.regression.outputs_of(effect.stage) for effect in added))
+    folds = engine.folds(present, noise)
+    errors = [
+        held_out_rms(engine.regression, fitted, noise, folds)
+        for fitted in (initial, present, larger)
+    ]
+    if any(errors[1][output] > _REST_ERROR * noise.rms[output] for output in own):
+        return False
+    before, left, after = (excess({o: e[o] for o in own}, noise.rms) for e in errors)
+    return left <= _REST * before and after > _LEFT_OF_REST * (left - after)
 
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
