@@ -53,6 +53,30 @@ def test_frames_are_those_that_python_can_wrote(name: str, tmp_path: Path) -> No
     assert is_trace(path.read_bytes())
 
 
+@pytest.mark.parametrize("name", ["t.asc", "t.log", "t.csv"])
+def test_frames_of_can_fd_are_those_that_python_can_wrote(name: str, tmp_path: Path) -> None:
+    contents = [bytes(range(size)) for size in (2, 8, 12, 16, 20, 24, 32, 48, 64)]
+    with WRITERS[name](str(tmp_path / name)) as writer:
+        for number, data in enumerate(contents):
+            switched = number % 2 == 0
+            writer(can.Message(START, 0x181, False, is_fd=True, bitrate_switch=switched, data=data))
+    assert [one.data for one in read_trace(tmp_path / name).frames] == contents
+
+
+@pytest.mark.parametrize("length", ["L", "l"])
+def test_frames_of_can_fd_in_a_trc_have_a_code_or_a_number_of_bytes(
+    length: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "t.trc"
+    lines = [f";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,{length},D"]
+    sizes = {9: 12, 15: 64, 8: 8, 10: 16}
+    for code, size in sizes.items():
+        number, data = code if length == "L" else size, bytes(range(size)).hex(" ").upper()
+        lines.append(f"      1      1283.231 FB 1      0181 Rx -  {number:<2}   {data}")
+    path.write_text("\n".join(lines) + "\n")
+    assert [len(one.data) for one in read_trace(path).frames] == [*sizes.values()]
+
+
 BY_HAND = {
     "candump": "  can0  181   [3]  37 06 FF\n  can0  080   [0] \n  can0  5FF   [1]  01\n",
     "candump -x": "  can0  RX - -  181   [3]  37 06 FF\n can0 TX - - 080 [0]\n"

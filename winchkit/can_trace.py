@@ -40,8 +40,8 @@ _FEWEST = 3
 """Frames that make a text a trace: one or two may look alike by chance."""
 _SHARE = 0.7
 """Share of the lines from the first frame on that are frames; others are events and comments."""
-_LONGEST = 64
-"""Bytes of the longest frame, of CAN FD."""
+_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Bytes of a frame of CAN FD by its data length code (ISO 11898-1)."""
 _SHOWN = 60
 """Characters of a line that are shown in a note."""
 
@@ -58,6 +58,10 @@ _ASC = re.compile(
     rf"(?P<time>\d+[.,]\d+)\s+(?P<bus>\d+)\s+(?P<id>{_ID})x?\s+[RT]x(?:Rq)?\s+"
     r"(?P<kind>[dr])(?:\s+(?P<count>[0-9a-fA-F]+)(?P<data>(?:\s+[0-9A-Fa-f]{1,3})*))?",
     re.IGNORECASE,
+)
+_ASC_FD = re.compile(
+    rf"(?P<time>\d+[.,]\d+)\s+CANFD\s+(?P<bus>\d+)\s+(?P<kind>[RT]x)\s+(?P<id>{_ID})x?\s+"
+    r"(?:\S+\s+)?[01]\s+[01]\s+(?P<count>[0-9a-fA-F])\s+\d+(?P<data>(?:\s+[0-9A-Fa-f]{1,3})*)"
 )
 _TRC = re.compile(
     r"\d+\)?\s+(?P<time>\d+\.?\d*)\s+(?:(?P<kind>DT|FD|FB|FE|BI|RR)\s+)?(?:(?P<bus>\d)\s+)?"
@@ -159,8 +163,7 @@ def read_trace(path: str | Path) -> Trace:
     if not data:
         raise FileError(Fault("the file is empty", name))
     if len(data) > LARGEST:
-        message = f"is larger than {LARGEST / 1e6:g} MB; split the trace"
-        raise FileError(Fault(message, name))
+        raise FileError(Fault(f"is larger than {LARGEST / 1e6:g} MB; split the trace", name))
     if data.startswith(b"LOGG"):
         return _read_blf(name, data)
     if b"\0" in data:
@@ -243,11 +246,8 @@ def _format_of(lines: Sequence[str]) -> tuple[str, Callable[[str], _Line | None]
     filled = [line.strip() for line in islice(lines, _SAMPLED) if line.strip()]
     counts = {name: sum(map(bool, map(read, filled))) for name, read in _READERS.items()}
     best = max(counts, key=lambda name: counts[name])
-    if (
-        counts[best]
-        and best == "ASC"
-        and any(line.lower().startswith("base dec") for line in filled)
-    ):
+    is_decimal = any(line.lower().startswith("base dec") for line in filled)
+    if counts[best] and best == "ASC" and is_decimal:
         return best, partial(_asc, base=10), ["identifiers and bytes are decimal (base dec)"]
     if counts[best]:
         return best, _READERS[best], []
@@ -297,12 +297,13 @@ def _dump_time(text: str) -> float:
 
 
 def _asc(line: str, base: int = 16) -> _Line | None:
-    found = _ASC.match(line)
+    found = _ASC.match(line) or _ASC_FD.match(line)
     if found is None:
         return None
     data = None
-    if found["kind"].lower() == "d":
+    if found["kind"].lower() != "r":
         count = int(found["count"] or "0", 16)
+        count = _LENGTHS[count] if found.re is _ASC_FD else count
         words = (found["data"] or "").split()[:count]
         data = _bytes([f"{int(word, base):02X}" for word in words], count)
         if data is None:
@@ -316,7 +317,10 @@ def _trc(line: str) -> _Line | None:
     if found is None:
         return None
     is_remote = found["data"] == "RTR" or found["kind"] == "RR"
-    data = None if is_remote else _bytes(found["data"].split(), int(found["count"]))
+    words, count = found["data"].split(), int(found["count"])
+    # A data length code, or the number of bytes ($COLUMNS with L or l).
+    count = _LENGTHS[count] if len(words) > count and count < len(_LENGTHS) else count
+    data = None if is_remote else _bytes(words, count)
     if data is None and not is_remote:
         return None
     return _Line(1e-3 * float(found["time"]), found["id"], data, found["bus"] or "")
@@ -339,7 +343,7 @@ def _general(line: str) -> _Line | None:
     words = _words(line)
     for index, word in enumerate(words[1:], start=1):
         count = word.strip("[]")
-        if not count.isdecimal() or not 0 < int(count) <= _LONGEST:
+        if not count.isdecimal() or not 0 < int(count) <= _LENGTHS[-1]:
             continue
         before = [one for one in words[:index] if _WORD_ID.fullmatch(one)]
         data = _bytes(words[index + 1 : index + 1 + int(count)], int(count))
@@ -351,7 +355,7 @@ def _general(line: str) -> _Line | None:
 
 
 def _bytes(words: Sequence[str], count: int) -> bytes | None:
-    if len(words) != count or count > _LONGEST or not all(map(_BYTE.fullmatch, words)):
+    if len(words) != count or count > _LENGTHS[-1] or not all(map(_BYTE.fullmatch, words)):
         return None
     return bytes.fromhex("".join(words))
 
@@ -490,7 +494,5 @@ def _time_scale(cell: str, *, is_savvy: bool) -> tuple[float, tuple[str, ...]]:
         return _UNITS[found[1]], ()
     if is_savvy:
         return 1e-6, ("times are in microseconds, as SavvyCAN writes them",)
-    note = (
-        f"'{cell}' has no unit: numbers with a fraction are taken as seconds, others are no times"
-    )
-    return math.nan, (note,)
+    note = "numbers with a fraction are taken as seconds, others are no times"
+    return math.nan, (f"'{cell}' has no unit: {note}",)
