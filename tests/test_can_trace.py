@@ -105,6 +105,10 @@ BY_HAND = {
     "SavvyCAN": "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
     "250000,00000181,false,Rx,0,3,37,06,FF,,,,,\n500000,00000080,false,Rx,0,0,,,,,,,,\n"
     "1000000,000005FF,false,Rx,0,1,01,,,,,,,\n",
+    "IXXAT": "ASCII Trace IXXAT MiniMon\nDate: 1.2.2025\nBaudrate: 500 kbit/s\n"
+    '"Time";"Identifier (hex)";"Format";"Flags";"Data (hex)"\n'
+    '"01:00:00.25";"181";"Std";"";"37 06 FF "\n"01:00:00.50";"80";"Std";"";""\n'
+    '"01:00:00.75";"702";"Std";"Rtr ";"Remote request  DLC = 1 "\n"01:00:01.00";"5FF";"Std";"";"01 "\n',
     "CSV with units": "Time [ms];Channel;CAN ID;DLC;Data\n250;1;0x181;3;37 06 FF\n500;1;0x80;0;\n"
     "1000;1;0x5FF;1;01\n",
     "CSV with decimal identifiers": "time (s),id,data\n0.25,385,3706FF\n0.5,128,\n1.0,1535,01\n",
@@ -124,7 +128,7 @@ def test_frames_as_programs_write_them(name: str, tmp_path: Path) -> None:
     if name in ("candump", "candump -x"):
         assert all(math.isnan(one.time) for one in frames)
         return
-    first = START if name in ("candump -ta", "candump -tA") else 0.0
+    first = {"candump -ta": START, "candump -tA": START, "IXXAT": 3600.0}.get(name, 0.0)
     assert [one.time - first for one in frames] == pytest.approx([0.25, 0.5, 1.0], abs=1e-6)
 
 
@@ -138,6 +142,15 @@ def test_remote_and_error_frames_are_counted(tmp_path: Path) -> None:
     assert [one.data for one in trace.frames] == [b"\x05", b"\x7f", b""]
     assert trace.notes[0].startswith("lines that are no frames: 1")
     assert trace.notes[1].endswith("left out: 1")
+
+
+def test_a_text_with_few_lines_like_frames_is_no_trace(tmp_path: Path) -> None:
+    path = tmp_path / "t.txt"
+    path.write_text(
+        "".join(f'"12.{n:02}";"A";"4 0{n % 8}{n % 8} 10"\n11 10 1 07\n' for n in range(9))
+    )
+    with pytest.raises(FileError, match="has no CAN frames"):
+        read_trace(path)
 
 
 def test_whole_numbers_without_a_unit_are_no_times(tmp_path: Path) -> None:
