@@ -53,6 +53,30 @@ def test_frames_are_those_that_python_can_wrote(name: str, tmp_path: Path) -> No
     assert is_trace(path.read_bytes())
 
 
+@pytest.mark.parametrize("name", ["t.asc", "t.log", "t.csv"])
+def test_frames_of_can_fd_are_those_that_python_can_wrote(name: str, tmp_path: Path) -> None:
+    contents = [bytes(range(size)) for size in (2, 8, 12, 16, 20, 24, 32, 48, 64)]
+    with WRITERS[name](str(tmp_path / name)) as writer:
+        for number, data in enumerate(contents):
+            switched = number % 2 == 0
+            writer(can.Message(START, 0x181, False, is_fd=True, bitrate_switch=switched, data=data))
+    assert [one.data for one in read_trace(tmp_path / name).frames] == contents
+
+
+@pytest.mark.parametrize("length", ["L", "l"])
+def test_frames_of_can_fd_in_a_trc_have_a_code_or_a_number_of_bytes(
+    length: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "t.trc"
+    lines = [f";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,{length},D"]
+    sizes = {9: 12, 15: 64, 8: 8, 10: 16}
+    for code, size in sizes.items():
+        number, data = code if length == "L" else size, bytes(range(size)).hex(" ").upper()
+        lines.append(f"      1      1283.231 FB 1      0181 Rx -  {number:<2}   {data}")
+    path.write_text("\n".join(lines) + "\n")
+    assert [len(one.data) for one in read_trace(path).frames] == [*sizes.values()]
+
+
 BY_HAND = {
     "candump": "  can0  181   [3]  37 06 FF\n  can0  080   [0] \n  can0  5FF   [1]  01\n",
     "candump -x": "  can0  RX - -  181   [3]  37 06 FF\n can0 TX - - 080 [0]\n"
@@ -81,6 +105,10 @@ BY_HAND = {
     "SavvyCAN": "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
     "250000,00000181,false,Rx,0,3,37,06,FF,,,,,\n500000,00000080,false,Rx,0,0,,,,,,,,\n"
     "1000000,000005FF,false,Rx,0,1,01,,,,,,,\n",
+    "IXXAT": "ASCII Trace IXXAT MiniMon\nDate: 1.2.2025\nBaudrate: 500 kbit/s\n"
+    '"Time";"Identifier (hex)";"Format";"Flags";"Data (hex)"\n'
+    '"01:00:00.25";"181";"Std";"";"37 06 FF "\n"01:00:00.50";"80";"Std";"";""\n'
+    '"01:00:00.75";"702";"Std";"Rtr ";"Remote request  DLC = 1 "\n"01:00:01.00";"5FF";"Std";"";"01 "\n',
     "CSV with units": "Time [ms];Channel;CAN ID;DLC;Data\n250;1;0x181;3;37 06 FF\n500;1;0x80;0;\n"
     "1000;1;0x5FF;1;01\n",
     "CSV with decimal identifiers": "time (s),id,data\n0.25,385,3706FF\n0.5,128,\n1.0,1535,01\n",
@@ -100,7 +128,7 @@ def test_frames_as_programs_write_them(name: str, tmp_path: Path) -> None:
     if name in ("candump", "candump -x"):
         assert all(math.isnan(one.time) for one in frames)
         return
-    first = START if name in ("candump -ta", "candump -tA") else 0.0
+    first = {"candump -ta": START, "candump -tA": START, "IXXAT": 3600.0}.get(name, 0.0)
     assert [one.time - first for one in frames] == pytest.approx([0.25, 0.5, 1.0], abs=1e-6)
 
 
@@ -114,6 +142,15 @@ def test_remote_and_error_frames_are_counted(tmp_path: Path) -> None:
     assert [one.data for one in trace.frames] == [b"\x05", b"\x7f", b""]
     assert trace.notes[0].startswith("lines that are no frames: 1")
     assert trace.notes[1].endswith("left out: 1")
+
+
+def test_a_text_with_few_lines_like_frames_is_no_trace(tmp_path: Path) -> None:
+    path = tmp_path / "t.txt"
+    path.write_text(
+        "".join(f'"12.{n:02}";"A";"4 0{n % 8}{n % 8} 10"\n11 10 1 07\n' for n in range(9))
+    )
+    with pytest.raises(FileError, match="has no CAN frames"):
+        read_trace(path)
 
 
 def test_whole_numbers_without_a_unit_are_no_times(tmp_path: Path) -> None:

@@ -39,6 +39,10 @@ _UNITS: dict[str, dict[str, float]] = {
 }  # fmt: skip
 _CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1252")
+_FORMS = (*["text"] * 6, "jsonl", "json", "xlsx", "mat", "npz", "mcap")
+"""Formats, those of text as often as all others together."""
+_UNITLESS = {"mat", "npz", "mcap"}
+"""Formats whose names have no units: the user gives them."""
 _START = datetime(2025, 3, 4, 11, 59, 50, tzinfo=UTC)
 
 
@@ -46,7 +50,7 @@ _START = datetime(2025, 3, 4, 11, 59, 50, tzinfo=UTC)
 class Recording:
     """A file with the truth that the test knows of it."""
 
-    path: Path
+    paths: tuple[Path, ...]
     options: tuple[str, ...]
     """Of ``winchkit import``: what the file does not say."""
     time: Array
@@ -63,6 +67,11 @@ class Recording:
     """Range of a channel that wraps, SI: its number of turns at the start is not known."""
     changes: tuple[str, ...] = ()
     """What was changed, in words."""
+
+
+def _key(name: str) -> str:
+    """A name as a variable of a program."""
+    return name.replace(" ", "_")
 
 
 def recording(seed: int, folder: Path) -> Recording:
@@ -102,6 +111,8 @@ class _Writer:
         self.resolution: dict[str, float] = {}
         self.names: dict[str, str] = {}
         self.options: list[str] = []
+        self.reversed: set[str] = set()
+        self.form = self.pick(list(_FORMS))
 
     def chance(self, share: float, words: str) -> bool:
         """Whether a change is made; it is noted then."""
@@ -114,24 +125,42 @@ class _Writer:
         return str(items[int(self.rng.integers(len(items)))])
 
     def write(self) -> Recording:
-        """Columns, then the order of the rows, then the file."""
+        """Columns, then the order of the rows, then the file, or two files of one clock."""
         stamps, clock = self._stamps()
-        columns = {name: self._column(name) for name in self.truth}
+        columns = [("Time" if self.rng.random() < 0.5 else "t", clock, stamps)]
+        columns += [
+            (self.names[name], *self._column(name)) for name in map(self._named, self.truth)
+        ]
         rows = self._rows()
-        heads = ["Time" if self.rng.random() < 0.5 else "t", *(h for h, _ in columns.values())]
-        heads[0] += f" [{clock}]" if clock else ""
-        cells = [[stamps[r], *(texts[r] for _, texts in columns.values())] for r in rows]
-        order = [0, *range(1, len(heads))]
+        order = [0, *range(1, len(columns))]
         if self.chance(0.4, "order of columns"):
-            order = list(map(int, self.rng.permutation(len(heads))))
+            order = list(map(int, self.rng.permutation(len(columns))))
+        parts = [order]
+        if self.chance(0.1, "two files"):
+            at = list(self.truth).index(list(self.truth)[-1]) + 1
+            parts = [[i for i in order if i != at], [i for i in order if i in {0, at}]]
+            self.options += ["--join", "--lag", "0 s"]
         if self.chance(0.3, "a column more"):
-            heads.append("Status word")
-            cells = [[*row, str(int(self.rng.integers(3)))] for row in cells]
-            order.append(len(order))
-        heads, cells = [heads[i] for i in order], [[row[i] for i in order] for row in cells]
-        path = self._file(heads, cells)
+            states = [str(int(self.rng.integers(3))) for _ in stamps]
+            columns.append(("Status word", "", states))
+            parts[0].append(len(columns) - 1)
+        paths = [
+            self._file(
+                self.stem.with_name(f"{self.stem.name}{'ab'[number]}"),
+                [columns[i][:2] for i in part],
+                [[columns[i][2][r] for i in part] for r in rows],
+            )
+            for number, part in enumerate(parts)
+        ]
+        for channel, name in self.names.items():
+            unit = next(unit for own, unit, _ in columns if own == name)
+            sign = "-" * (channel in self.reversed)
+            if self.form in _UNITLESS:
+                self.options += ["--column", f"{channel}={sign}{_key(name)} [{unit}]"]
+            elif sign:
+                self.options += ["--column", f"{channel}=-{name}"]
         return Recording(
-            path,
+            tuple(paths),
             tuple(self.options),
             self.time,
             self.truth,
@@ -142,9 +171,14 @@ class _Writer:
             tuple(self.changes),
         )
 
+    def _named(self, channel: str) -> str:
+        """The channel, after its column has a name."""
+        self.names[channel] = self.pick(_NAMES[channel])
+        return channel
+
     def _column(self, channel: str) -> tuple[str, list[str]]:
-        """Header and cells of a channel."""
-        name, unit = self.pick(_NAMES[channel]), self.pick(list(_UNITS[channel]))
+        """Unit and cells of a channel."""
+        unit = self.pick(list(_UNITS[channel]))
         si, decimals = _UNITS[channel][unit], int(self.rng.integers(2, 6))
         values = self.truth[channel](self.time) / si
         if unit == "counts":
@@ -155,11 +189,10 @@ class _Writer:
         # Numbers as a recorder writes them: at least some hundred steps over the range.
         decimals = max(decimals, 3 - math.floor(math.log10(float(np.ptp(values)))))
         decimals = 0 if unit == "counts" else decimals
-        head, sign = f"{name} [{unit}]", 1.0
-        self.names[channel] = name
+        sign = 1.0
         if self.chance(0.15, f"sign of {channel}"):
             sign = -1.0
-            self.options += ["--column", f"{channel}=-{name}"]
+            self.reversed.add(channel)
         values = np.round(sign * values, decimals)
         self.resolution[channel] = 10.0**-decimals * si
         base = channel.rpartition("_")[2]
@@ -171,7 +204,7 @@ class _Writer:
             scale = 10.0**decimals
             if float(np.max(np.abs(values))) * scale < 32000:
                 values = np.where(values < 0, values + 65536 / scale, values)
-        return head, [f"{value:.{decimals}f}" for value in values]
+        return unit, [f"{value:.{decimals}f}" for value in values]
 
     def _stamps(self) -> tuple[list[str], str]:
         """Stamps as text, and the unit of their header."""
@@ -179,7 +212,8 @@ class _Writer:
         if self.chance(0.3, "jitter of the clock"):
             time = time + self.rng.uniform(-0.2, 0.2, len(time)) * self.period
             self.time = time
-        kind = self.pick(("s", "ms", "us", "iso", "epoch"))
+        kinds = ("s", "ms", "us", "iso", "epoch")
+        kind = self.pick(kinds[:3] if self.form in _UNITLESS else kinds)
         self.clock = 1e-6
         start = float(self.rng.choice([0.0, 12.5, 4711.0]))
         if kind == "iso":
@@ -214,43 +248,74 @@ class _Writer:
             rows = rows[: at + 40] + rows[at:]
         return rows
 
-    def _file(self, heads: list[str], cells: list[list[str]]) -> Path:
-        form = self.rng.random()
-        if form < 0.1:
-            return self._json(heads, cells)
-        if form < 0.16:
-            return self._workbook(heads, cells)
-        return self._text(heads, cells)
+    def _file(self, stem: Path, columns: Sequence[tuple[str, str]], cells: list[list[str]]) -> Path:
+        """A file of columns, each with its name and its unit."""
+        self.changes.append(self.form)
+        heads = [f"{name} [{unit}]" if unit else name for name, unit in columns]
+        if self.form == "text":
+            return self._text(stem.with_suffix(".csv"), heads, cells)
+        numbers = [[c if ":" in c else float(c) for c in row] for row in cells]
+        if self.form in {"jsonl", "json"}:
+            return self._json(stem, heads, numbers)
+        path = stem.with_suffix(f".{self.form}")
+        if self.form == "xlsx":
+            from openpyxl import Workbook
 
-    def _json(self, heads: list[str], cells: list[list[str]]) -> Path:
-        rows = [
-            {h: c if ":" in c else float(c) for h, c in zip(heads, row, strict=True)}
-            for row in cells
-        ]
-        self.changes.append("JSON")
-        if self.rng.random() < 0.5:
-            path = self.stem.with_suffix(".jsonl")
+            book = Workbook()
+            for row in (heads, *numbers):
+                book.worksheets[0].append(row)
+            book.save(path)
+            return path
+        if self.form == "mcap":
+            return self._messages(path, columns, np.array(numbers))
+        time = columns.index(next(c for c in columns if c[0] in {"Time", "t"}))
+        keys = [f"t_{unit}" if i == time else _key(name) for i, (name, unit) in enumerate(columns)]
+        arrays = dict(zip(keys, np.array(numbers).T, strict=True))
+        if self.form == "mat":
+            from scipy.io import savemat
+
+            savemat(path, arrays)
+        else:
+            np.savez(path, **arrays)
+        return path
+
+    def _json(self, stem: Path, heads: list[str], numbers: Sequence[Sequence[str | float]]) -> Path:
+        rows = [dict(zip(heads, row, strict=True)) for row in numbers]
+        path = stem.with_suffix(f".{self.form}")
+        if self.form == "jsonl":
             path.write_text("\n".join(map(json.dumps, rows)) + "\n")
         else:
-            path = self.stem.with_suffix(".json")
             path.write_text(json.dumps({h: [row[h] for row in rows] for h in heads}))
         return path
 
-    def _workbook(self, heads: list[str], cells: list[list[str]]) -> Path:
-        from openpyxl import Workbook
+    def _messages(self, path: Path, columns: Sequence[tuple[str, str]], numbers: Array) -> Path:
+        """Messages in JSON, some with the stamp of their source, logged up to 3 ms later."""
+        from mcap.writer import Writer
 
-        self.changes.append("XLSX")
-        book = Workbook()
-        sheet = book.active
-        assert sheet is not None
-        sheet.append(heads)
-        for row in cells:
-            sheet.append([c if ":" in c else float(c) for c in row])
-        path = self.stem.with_suffix(".xlsx")
-        book.save(path)
+        is_stamped = self.chance(0.5, "stamps of the source")
+        at = next(i for i, (name, _) in enumerate(columns) if name in {"Time", "t"})
+        zero = round(_START.timestamp() * 1e9)
+        with open(path, "wb") as stream:
+            writer = Writer(stream)
+            writer.start()
+            topic = writer.register_channel("/axis", "json", 0)
+            for row in numbers:
+                stamp = zero + round(row[at] * _CLOCKS[columns[at][1]] * 1e9)
+                later = int(self.rng.integers(3_000_000)) if is_stamped else 0
+                message: dict[str, object] = {
+                    _key(name): value
+                    for i, ((name, _), value) in enumerate(zip(columns, row, strict=True))
+                    if i != at
+                }
+                if is_stamped:
+                    sec, nanosec = divmod(stamp, 1_000_000_000)
+                    message["header"] = {"stamp": {"sec": sec, "nanosec": nanosec}}
+                data = json.dumps(message).encode()
+                writer.add_message(topic, stamp + later, data, stamp + later)
+            writer.finish()
         return path
 
-    def _text(self, heads: list[str], cells: list[list[str]]) -> Path:
+    def _text(self, path: Path, heads: list[str], cells: list[list[str]]) -> Path:
         mark = self.pick((",", ";", "\t", "|"))
         comma = mark != "," and self.chance(0.4, "decimal comma")
         if comma:
@@ -272,6 +337,5 @@ class _Writer:
         ends = self.pick(("\n", "\r\n"))
         encoding = self.pick(_ENCODINGS)
         self.changes.append(f"{encoding}, {mark!r}")
-        path = self.stem.with_suffix(".csv")
         path.write_bytes((ends.join(lines) + ending).encode(encoding))
         return path

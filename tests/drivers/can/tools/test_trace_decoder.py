@@ -143,6 +143,12 @@ def test_a_pdo_of_another_length_has_no_values_and_a_note() -> None:
     assert any("has 6 bytes in 1 frames" in note for note in notes(decoder))
 
 
+@pytest.mark.parametrize("identifier", [0x002, 0x07F, 0x200, 0x580, 0x7EA, 0x8002])
+def test_an_identifier_of_no_service_is_of_no_node(identifier: int) -> None:
+    """CiA 301: the predefined connection set begins with node 1."""
+    assert said(by_eds(), identifier, "40 01") == Decoded("other", 0, "40 01")
+
+
 def test_a_description_of_another_device_is_reported() -> None:
     decoder = TraceDecoder(read_description("maxon-epos4"))
     said(decoder, 0x601, "4018100100000000")

@@ -54,7 +54,6 @@ _TRANSFERS = {2: "read", 5: "block transfer of", 6: "block transfer of"}
 """Command specifiers of the other SDO transfers (CiA 301)."""
 _MODE = (0x6061, 0)
 _WORDED = (0x6040, 0x6041, 0x6060, 0x6061, 0x603F)
-_ELEVEN_BITS = 0x800
 _FIRST_OBJECT = 0x1000
 """Lower indices are data types: gaps in a mapping (CiA 301)."""
 _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
@@ -168,10 +167,11 @@ def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Deco
         if (pdo := one.pdos.get(identifier)) is not None:
             return _pdo(pdo, number, one, data)
     base = identifier & ~0x7F
-    if base in _PDOS and identifier < _ELEVEN_BITS:
-        return Decoded(_PDOS[base], node, f"{known.name}: {data.hex(' ')}")
-    kind, words = _of_node(base, data, known)
-    return Decoded(kind, node, f"{known.name}: {words}")
+    raw = data.hex(" ") or "no bytes"
+    if base in _PDOS and node:
+        return Decoded(_PDOS[base], node, f"{known.name}: {raw}")
+    kind, words = _of_node(base, data, known) if node else ("other", "")
+    return Decoded(kind, node, f"{known.name}: {words}") if words else Decoded(kind, 0, raw)
 
 
 def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> Decoded:
@@ -192,8 +192,8 @@ def _nmt(data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
 
 
 def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:
-    """Kind and words of a frame that bears a node's number."""
-    raw = data.hex(" ")
+    """Kind and words of a frame of a node's services; no words for another frame."""
+    raw = data.hex(" ") or "no bytes"
     if base == 0x080:
         return "EMCY", str(parse_emergency(data, 0.0) or raw)
     if base == _HEARTBEAT:
@@ -201,7 +201,7 @@ def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:
     if base in (_SDO_REQUEST, _SDO_REPLY) and len(data) == 8:
         words = _request if base == _SDO_REQUEST else _reply
         return "SDO", words(data, known)
-    return "other", raw
+    return "other", ""
 
 
 def write_frames(node: int, index: int, sub: int, data: bytes) -> list[tuple[int, bytes]]:
