@@ -15,6 +15,7 @@ from winchkit.errors import Fault
 from winchkit.model.rotation import quaternion_of, rotation_by
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.clocks.point_names import names_of_points
 from winchkit.runs.importing.clocks.row_order import STILL, rows_in_order
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
@@ -68,6 +69,8 @@ class Streams:
     notes: tuple[str, ...] = field(default=())
     wraps: Mapping[str, float] = field(default_factory=dict)
     """Range in SI of every channel whose numbers wrap."""
+    names: tuple[Sequence[str], ...] = ()
+    """Columns that may be the names of points, a text per row of the table."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -133,6 +136,7 @@ def streams_of(guess: Guess) -> Streams:
         tuple(faults),
         tuple(notes),
         {item.channel: range_of(item.stored) * abs(item.factor) for item in guess.used},
+        names_of_points(table, used),
     )
 
 
