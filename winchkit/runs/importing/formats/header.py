@@ -136,7 +136,7 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
             continue
         if not given or not fits or (not texts and not spread):
             break
-        if len(given) == 1 and width > 1:
+        if len(given) == 1 and width > 1 and not spread:
             break
         if end > cut and len(given) == 2 and width > 3 and not spread:
             break
