@@ -112,7 +112,9 @@ def command(
             value = load(path).value
             if (of_wing := wings.call("record", value)) is not None:
                 if rate is not None:
-                    raise UsageError("--rate is of winches; a robot's log has the rows of its bench")
+                    raise UsageError(
+                        "--rate is of winches; a robot's log has the rows of its bench"
+                    )
 
                 def tell(what: str, share: float | None = done) -> None:
                     progress(what, share)

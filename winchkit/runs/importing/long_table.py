@@ -96,9 +96,9 @@ def _rows_of(table: Table, by: str, what: str) -> tuple[Column, dict[str, NDArra
 def marker_column(table: Table) -> Column | None:
     """The column that names the marker of each row, of several markers of a camera."""
     for column in table.columns:
-        if words_of(column.name) in _MARKERS and (names := _names(column)) is not None:
-            if 1 < len(set(names.tolist()) - {""}) <= _MOST:
-                return column
+        names = _names(column) if words_of(column.name) in _MARKERS else None
+        if names is not None and 1 < len(set(names.tolist()) - {""}) <= _MOST:
+            return column
     return None
 
 

@@ -115,8 +115,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     *(
         (
-            rf"^({axis}|p{axis}|pos(ition)? {axis}|{axis} pos(ition)?|t(vec ?)?{axis}|{axis} coord\w*|"
-            rf".* position {axis}|translation {axis})$",
+            rf"^({axis}|p{axis}|pos(ition)? {axis}|{axis} pos(ition)?|t(vec ?)?{axis}|"
+            rf"{axis} coord\w*|.* position {axis}|translation {axis})$",
             1,
             f"platform_{axis}",
         )

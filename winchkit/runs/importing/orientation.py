@@ -58,7 +58,7 @@ def settle_orientation(work: Work) -> None:
     -----
     A pitch beyond ±π/2 is none, and a rotation vector is not longer than π. Else the convention
     counts whose largest step from row to row is five times smaller; small rotations are alike in
-    all. Degrees are angles, but for the exports of Vicon and of OptiTrack, which have several kinds.
+    all. Degrees are angles, but in exports of Vicon and of OptiTrack, which have several kinds.
     """
     found = {item.base: item for item in work.columns if item.base in ANGLES}
     items = [found[name] for name in ANGLES if name in found]

@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from winchkit.runs.importing.streams import Streams
 
 _TITLES = frozenset(
-    ("point", "point name", "point id", "point no", "target", "pose", "pose no", "punkt")
-    + ("punktname", "punktnummer", "name", "pt", "pt id", "pos name", "station")
+    (
+        *("point", "point name", "point id", "point no", "pt", "pt id", "name", "target"),
+        *("pose", "pose no", "pose name", "punkt", "punktname", "punktnummer"),
+    )
 )
 """Titles of a column with the names of points, which may be numbers."""
 _DISTINCT = 0.9
@@ -43,7 +45,7 @@ def names_of_points(table: Table, used: Collection[str]) -> tuple[Sequence[str],
         names = column.texts
         if names is None and titled:
             names = [f"{value:.12g}" for value in column.values.tolist()]
-        if names is None or column.source in used or not len(names):
+        if names is None or column.source in used or not names:
             continue
         names = [name.strip() for name in names]
         if len(set(names)) >= _DISTINCT * len(names):
@@ -108,7 +110,5 @@ def _at(streams: Streams, places: NDArray[np.intp]) -> Streams:
     """Some samples of a file with one stream, in another order."""
     (stream,) = streams.streams
     channels = {name: values[places] for name, values in stream.channels.items()}
-    chosen = replace(
-        stream, time=stream.time[places], channels=channels, rows=stream.rows[places]
-    )
+    chosen = replace(stream, time=stream.time[places], channels=channels, rows=stream.rows[places])
     return replace(streams, streams=(chosen,))

@@ -29,7 +29,9 @@ def with_coordinates(table: Table) -> Table:
         return table
     names = len(list(takewhile(_is_text, columns)))
     behind = columns[names + len(_COORDINATES) :]
-    by_program = any(_PROGRAM in text.casefold() for pair in table.metadata.items() for text in pair)
+    by_program = any(
+        _PROGRAM in text.casefold() for pair in table.metadata.items() for text in pair
+    )
     if not 1 <= names <= len(_NAMES) or len(columns) < names + len(_COORDINATES):
         return table
     coordinates = columns[names : names + len(_COORDINATES)]
