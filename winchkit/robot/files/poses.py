@@ -170,6 +170,12 @@ def _numbers(poses: Measured) -> Iterator[bytes]:
         yield np.asarray(row + 0.0).tobytes()
 
 
+def held_unmeasured(measured: Measured, profile: RobotProfile) -> NDArray[np.bool_]:
+    """Coordinates of a position that guides hold and nothing measured, (3,): in no distance."""
+    seen = np.any(np.isfinite(measured.position), axis=0)
+    return ~seen & (np.array(profile.platform.free[:3]) == 0)
+
+
 def of_poses(mask: NDArray[np.bool_]) -> str:
     """Number of poses of a mask, with their verb."""
     count = int(mask.sum())
@@ -310,7 +316,7 @@ def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, li
         session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    return found[moved], [*_partly(run), *_gaps(found, moved)]
+    return found[moved], [*_partly(run, profile), *_gaps(found, moved, profile)]
 
 
 def _position_columns(run: Run) -> tuple[str, ...]:
@@ -349,9 +355,10 @@ def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
     return found, [note]
 
 
-def _partly(run: Run) -> list[str]:
+def _partly(run: Run, profile: RobotProfile) -> list[str]:
     """Notes on incomplete groups of columns, which are valid but often a misspelling."""
-    given, lacking = _present(run, _position_columns(run))
+    columns = zip(_position_columns(run), profile.platform.free, strict=False)
+    given, lacking = _present(run, [name for name, free in columns if free or name in run])
     if not given or not lacking:
         return []
     return [
@@ -360,13 +367,13 @@ def _partly(run: Run) -> list[str]:
     ]
 
 
-def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:
+def _gaps(found: Measured, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
     notes = []
     if left := int(np.count_nonzero(~moved)):
         notes.append(f"{left} rows without any motor angle were left out")
     kept = found[moved]
-    for name in ("motor_angle", "position"):
-        values = getattr(kept, name)
+    position = kept.position[:, ~held_unmeasured(kept, profile)]
+    for name, values in (("motor_angle", kept.motor_angle), ("position", position)):
         missing = int(np.count_nonzero(np.isnan(values)))
         if 0 < missing < values.size:
             notes.append(f"{missing} of {values.size} values of {name} are missing")
