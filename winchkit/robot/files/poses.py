@@ -23,6 +23,7 @@ from winchkit.errors import Fault, RunError, suggest
 from winchkit.model.rotation import angles_of, rotation_from_quaternion
 from winchkit.robot.files.holds import averaged, holds_of, is_log
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.instruments import TrackerSpec
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -91,6 +92,10 @@ _REST = 0.25
 points stops at each for less."""
 _LEAST_TURN = 2e-3
 """Turn of a drum below which poses are the same, rad: 0.1 mm of cable on a radius of 50 mm."""
+_AS_BASE = (
+    "positions are tracker_x, tracker_y, tracker_z, taken as those in the base frame: where the "
+    'tracker stands in another one, write [instrument.tracker] frame = "unknown" into the profile'
+)
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
 _CIRCULAR = frozenset({"angles", "swivel"})
 """Whose mean over a hold is the circular one."""
@@ -316,7 +321,11 @@ def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, li
         session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    return found[moved], [*_partly(run, profile), *_gaps(found, moved, profile)]
+    notes = [*_partly(run, profile), *_gaps(found, moved, profile)]
+    is_base = _position_columns(run) is _TRACKED and own.tracker.frame == TrackerSpec.frame
+    if is_base and np.any(np.isfinite(found.position)):
+        notes.append(_AS_BASE)
+    return found[moved], notes
 
 
 def _position_columns(run: Run) -> tuple[str, ...]:
