@@ -27,7 +27,6 @@ from click.testing import CliRunner
 
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.tracker import Tracker
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.errors import NotPermitted
@@ -155,12 +154,9 @@ def recorded(sim: SimBench, profile: Path, seed: int, folder: Path) -> Path:
     with LiveBench(sim, seed=seed, simulated_time=clock) as live:
         spec = live.bench_spec
         assert spec.robot is not None
-        assert live.robot is not None
         spec = replace(spec, robot=replace(spec.robot, profile=str(profile)))
         with open_bench(spec, clock) as bench:
-            tracker = Tracker(clock.now)
-            live.robot.on_pose = tracker.receive
-            bench._tracker = tracker
+            assert bench.tracker is not None, "it receives from now on"
             clock.sleep(0.5)
             return _logged(bench, random, folder / "path.csv")
 

@@ -60,6 +60,40 @@ def vicon(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def vicon_objects(path: Path, kind: str = "Quaternion") -> None:
+    """Tracker: a name of the object's convention, no times, no unit of its quaternion."""
+    _, position, yaw, q = poses()
+    zero = np.zeros(COUNT)
+    turned = q[:, [1, 2, 3, 0]] if kind == "Quaternion" else np.stack([zero, zero, yaw], axis=1)
+    names = ["RX", "RY", "RZ", "RW"][: turned.shape[1]]
+    units = [""] * 4 if kind == "Quaternion" else ["rad"] * 3
+    label = ["", "", f"Global Angle ({kind}) plat:plat", *[""] * (len(names) + 2)]
+    lines = [
+        "Objects",
+        "100",
+        ",".join(label),
+        ",".join(["Frame", "Sub Frame", *names, "TX,TY,TZ"]),
+    ]
+    lines.append(",".join(["", "", *units, "mm,mm,mm"]))
+    for k, row in enumerate(np.concatenate([turned, 1e3 * position], axis=1)):
+        lines.append(f"{k + 1},0," + ",".join(f"{v:.9f}" for v in row))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def vicon_helical(path: Path) -> None:
+    """The same with rotation vectors."""
+    vicon_objects(path, "Helical")
+
+
+def aruco(path: Path) -> None:
+    """Rotation and translation vectors of OpenCV."""
+    t, position, yaw, _ = poses()
+    lines = ["timestamp,marker_id,tvec_x [m],tvec_y [m],tvec_z [m],rvec_x,rvec_y,rvec_z"]
+    for k, p in enumerate(position):
+        lines.append(f"{t[k]:.3f},7," + ",".join(f"{v:.9f}" for v in (*p, 0.0, 0.0, yaw[k])))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def spatial_analyzer(path: Path) -> None:
     """Comments with the units, blanks between the columns, fixed angles."""
     _, position, yaw, _ = poses()

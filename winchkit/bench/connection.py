@@ -121,9 +121,11 @@ class BenchConnection(ABC):
 
         with self._tracker_lock:
             if self._tracker is None:
-                tracker = Tracker(self.clock.now)
-                tracker.listen(wiring.listen)
-                self._tracker = tracker
+                self._tracker = Tracker(self.clock.now)
+                if isinstance(self.clock, Scheduler):
+                    self.clock.receive_datagrams(wiring.listen, self._tracker.receive)
+                else:
+                    self._tracker.listen(wiring.listen)
             return self._tracker
 
     def __enter__(self) -> Self:

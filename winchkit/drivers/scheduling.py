@@ -66,6 +66,9 @@ class Scheduler(Protocol):
     def serial_port(self, port: str) -> Any | None:
         """The simulated serial line of this name; None where there is none."""
 
+    def receive_datagrams(self, address: str, take: Callable[[bytes], None]) -> None:
+        """Call a function with each datagram that a simulated device sends to an address."""
+
 
 def thread_of(clock: Clock, target: Callable[[], None], name: str) -> Thread:
     """A daemon thread, not started yet."""

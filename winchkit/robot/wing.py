@@ -30,6 +30,7 @@ WING = Wing(
         "RobotProgramme": {
             "execute": "winchkit.robot.bench.programme:run_robot_programme",
             "preview": "winchkit.robot.web.programmes:preview",
+            "record": "winchkit.robot.cli.simulated:record_robot",
             "run_command": "winchkit.robot.cli.run:run_robot",
         },
         "RobotAnswer": {

@@ -29,8 +29,9 @@ MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
 MODULO, TWOS, MAGNITUDE = "modulo", "two's complement", "sign and magnitude"
 """How numbers are stored that wrap or have lost their sign."""
-VECTOR = "rotation vector"
-"""How roll, pitch and yaw are stored as the components of a rotation vector."""
+VECTOR, EULER = "rotation vector", "angles of Rx Ry Rz"
+"""How roll, pitch and yaw are stored as the components of a rotation vector, or as the angles of
+another product than Rz Ry Rx."""
 
 _OF_A_WINCH = {
     **{"motor_angle": "angle", "motor_velocity": "angular speed"},
@@ -84,7 +85,8 @@ class MappedColumn(Table):
     stored: str = ""
     """``modulo 360`` for numbers that wrap there, ``two's complement 65536`` or ``sign and
     magnitude 65536`` for ones without their sign, with the number of values of the field;
-    ``rotation vector`` for the three components of one in place of roll, pitch and yaw."""
+    ``rotation vector`` for the three components of one in place of roll, pitch and yaw, ``angles
+    of Rx Ry Rz`` for theirs."""
 
     def rules(self) -> Iterator[Rule]:
         """The channel exists, and the factor is known."""
@@ -107,8 +109,8 @@ class MappedColumn(Table):
             yield "factor", f"{self.factor:g} is not a scale"
         kind, _, size = self.stored.rpartition(" ")
         is_known = kind in {MODULO, TWOS, MAGNITUDE} and _is_positive(size)
-        if self.stored not in {"", VECTOR} and not is_known:
-            kinds = f"'{MODULO} N', '{TWOS} N', '{MAGNITUDE} N', '{VECTOR}'"
+        if self.stored not in {"", VECTOR, EULER} and not is_known:
+            kinds = f"'{MODULO} N', '{TWOS} N', '{MAGNITUDE} N', '{VECTOR}', '{EULER}'"
             yield "stored", f"'{self.stored}' is none of {kinds}"
 
     @property

@@ -78,8 +78,8 @@ def simulate(
     require_type(programme, Programme, "programme")
     if bench.platform is not None:
         raise UsageError(
-            f"{bench.name} is a robot, whose winches move one platform; 'sim record' moves each "
-            "winch alone: use 'winchkit sim serve' and move the platform"
+            f"{bench.name} is a robot, whose winches move one platform, and '{programme.name}' "
+            "moves each winch alone; give a robot programme (docs/howto/robot-motion.md)"
         )
     if not 0 < rate <= 1 / MAX_STEP:
         raise UsageError(f"rate {rate:g} Hz must be above 0 and at most {1 / MAX_STEP:g} Hz")

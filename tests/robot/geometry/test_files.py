@@ -7,11 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from scipy.spatial.transform import Rotation
 
 from robot_cases import shipped
+from winchkit.arrays import Array
 from winchkit.cli import main
 from winchkit.errors import FileError
 from winchkit.robot import ForceLimits, quadratic
+from winchkit.schema.profiles.instruments import FrameSpec
 from winchkit.schema.read import read_robot
 
 PAPERS = ("cabtive", "ipanema3", "winding-device-8")
@@ -159,6 +162,57 @@ def test_a_hanging_platform_that_would_not_rest_at_home(check: object) -> None:
     again = check(moved)
     assert again.exit_code == 0
     assert again.stderr == ""
+
+
+def measured(turned: Rotation, place: Array) -> str:
+    """A table with the frame through points, which a tracker saw from this pose."""
+    own = {"origin": place, "x_point": place + turned.apply([2.0, 0.0, 0.3])}
+    points = [f"{k} = [{', '.join(map(_metres, v))}]" for k, v in own.items()]
+    up = ", ".join(map(repr, turned.apply([0, 0, 1]).tolist()))
+    return f"[instrument.tracker]\nframe = {{ {', '.join(points)}, up = [{up}] }}\n"
+
+
+def _metres(value: float) -> str:
+    return f'"{float(value)!r} m"'
+
+
+def test_a_frame_through_measured_points_and_a_home_pose_as_the_tracker_showed_it(
+    tmp_path: Path,
+) -> None:
+    turned, place = Rotation.from_euler("ZYX", [130, 2, -3], degrees=True), np.array([3.0, -1, 2])
+    home = place + turned.apply([0.01, 0.02, 1.03])  # with a reflector beside the origin
+    angles = ", ".join(f'"{a!r} rad"' for a in turned.as_euler("ZYX")[::-1].tolist())
+    seen = f"position = [{', '.join(map(_metres, home))}]\nrotation = [{angles}]"
+    text = FOUR.replace('position = ["0 m", "0 m", "1 m"]', f'frame = "tracker"\n{seen}')
+    path = tmp_path / "robot.toml"
+    path.write_text(text + measured(turned, place) + 'reflector = ["10 mm", "20 mm", "30 mm"]\n')
+    profile = read_robot(path)
+    frame = profile.instrument.tracker.frame
+    assert isinstance(frame, FrameSpec)
+    assert frame.position == pytest.approx(tuple(place))
+    assert Rotation.from_euler("ZYX", frame.rotation[::-1]).as_matrix() == pytest.approx(
+        turned.as_matrix()
+    )
+    assert profile.home.position == pytest.approx((0, 0, 1), abs=1e-12)
+    assert profile.home.rotation == pytest.approx((0, 0, 0), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (
+            'frame = { origin = ["0 m", "0 m", "0 m"], x_point = ["0 m", "1 mm", "2 m"] }',
+            "gives no x axis",
+        ),
+        ('frame = { origin = ["0 m", "0 m", "0 m"] }', "measured points"),
+        ('frame = "unknown"', "home.frame: needs the frame and the reflector"),
+    ],
+)
+def test_points_that_give_no_frame(check: object, table: str, words: str) -> None:
+    text = FOUR.replace("[home]", '[home]\nframe = "tracker"')
+    result = check(f"{text}\n[instrument.tracker]\n{table}\n")  # type: ignore[operator]
+    assert result.exit_code == 3
+    assert words in result.stderr
 
 
 def test_a_hanging_platform_without_mass(check: object) -> None:

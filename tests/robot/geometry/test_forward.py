@@ -23,6 +23,7 @@ from winchkit.robot import (
     structure_matrix,
 )
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 Array = np.ndarray
 seeds = st.integers(0, 10_000)
@@ -198,3 +199,18 @@ def test_cables_in_one_plane_leave_motions_without_curvature_where_they_are() ->
     wrong = np.array([[1.255, 1.94, 2.146, 1.736], [2.048, 1.876, 1.129, 1.348]])
     found = forward(flat, wrong, start, PlatformSpec(1.0))
     assert np.all(np.isfinite(found.pose.position[found.converged]))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0, 0.0])
+def test_a_level_platform_whose_lengths_are_a_micrometre_inconsistent_is_found(sign: float) -> None:
+    """On four cables in two planes of symmetry no motion changes one sum of the lengths."""
+    robot = shipped("hanging-4")
+    place = np.array([0.0, 0.0, 0.85])
+    there = lengths(robot.geometry, place[None], np.eye(3)[None])
+    off = sign * 2e-6 * np.array([1.0, -1.0, 1.0, -1.0])
+    found = forward(robot.geometry, there + off, robot.home, robot.platform)
+    assert found.converged.all()
+    assert found.pose.position[0] == pytest.approx(place, abs=1e-5)
+    assert np.abs(found.residual).max() < 1e-5
+    weight = robot.platform.mass * GRAVITY
+    assert found.forces[0].sum() > weight, "they lean"

@@ -11,6 +11,7 @@ import pytest
 
 from small_robots import FRAME, PLATE, RADIUS, RATIO, planar, small_robot
 from winchkit.arrays import Array
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.errors import UsageError
 from winchkit.robot import ForceLimits, Pose, calibrate, quadratic, rotation_of
 from winchkit.robot.calibration.calibrate import equations_of
@@ -20,7 +21,7 @@ from winchkit.robot.diagnosis.compare import compared
 from winchkit.robot.dynamics.dynamics import accelerations
 from winchkit.robot.files.poses import Measured, read_poses
 from winchkit.runs import read_run
-from winchkit.schema.profiles.robot import COORDINATES, PlatformSpec
+from winchkit.schema.profiles.robot import COORDINATES, PlatformSpec, Point
 from winchkit.units import GRAVITY
 
 
@@ -105,10 +106,16 @@ def test_degrees_of_freedom_are_a_group_of_motions(names: tuple[str, ...], sound
     assert (not faults) == sound
 
 
-def recorded(path: Path) -> Path:
-    """Poses of a planar robot whose points are some millimetres from the profile's."""
+def recorded(path: Path, second: Point | None = None) -> Path:
+    """Poses of a planar robot whose points are some millimetres from the profile's.
+
+    ``second``: of the second exit point alone, m.
+    """
     rng = np.random.default_rng(8)
     offset = rng.normal(0, 4e-3, (2, 4, 3)) * [1, 0, 1]
+    if second is not None:
+        offset[:] = 0.0
+        offset[0, 1] = second
     exits, anchors = np.array(FRAME) + offset[0], np.array(PLATE) + offset[1]
     home = [flat_length(e, b, 0.0, 1.0, 0.0) for e, b in zip(exits, anchors, strict=True)]
     lines = [
@@ -142,6 +149,21 @@ def test_a_planar_robot_is_calibrated_in_its_plane(tmp_path: Path) -> None:
     assert not any(name.endswith("point.y") for name in found.estimates)
     z = [abs(e.value - e.nominal) / e.std for e in found.estimates.values()]
     assert max(z) > 10, "the points were some millimetres off"
+
+
+def test_a_planar_robot_is_diagnosed_without_what_its_guides_hold(tmp_path: Path) -> None:
+    run = read_run(recorded(tmp_path / "poses.csv", (4e-3, 0.0, -3e-3)))
+    across = {"platform_y", "platform_roll", "platform_yaw"}
+    flat = replace(run, channels={n: c for n, c in run.channels.items() if n not in across})
+    profile = planar().profile
+    assert not read_poses([flat], profile).notes
+    for own in (run, flat):
+        found = diagnose([own], profile).diagnosis
+        (step,) = found.steps
+        (place,) = step.place
+        assert (step.effects[0], place.line) == ("exit-point", "2")
+        after = found.outputs["platform_position"].heldout_rms_after
+        assert after < 3 * 3e-5 * sqrt(3), "three times the tracker's noise"
 
 
 def test_cables_in_a_plane_calibrate_no_platform_in_space(tmp_path: Path) -> None:

@@ -5,18 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.spatial.transform import Rotation
 
 from winchkit import open_bench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.catalog import find
+from winchkit.cli import main
 from winchkit.errors import FileError, NotPermitted, UsageError
 from winchkit.robot.sim.build import build_robot
+from winchkit.runs import read_run
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import profiles_of, programme_path
 from winchkit.sim.clock.simulated_clock import SimulatedClock
@@ -152,8 +156,35 @@ def test_a_platform_that_no_cable_forces_hold_is_refused() -> None:
         build_robot(sim, replace(sim.platform, center_of_mass=(0.5, 0.0, 0.0)))
 
 
+@pytest.mark.slow
+def test_a_robot_programme_is_recorded_in_simulated_time(tmp_path: Path) -> None:
+    """By the command: the platform of the true geometry goes where the tracker shows it."""
+    programme, sim = tmp_path / "side.toml", tmp_path / "robot.toml"
+    sim.write_text(find("sim", "cabtive-robot").read_text().replace('"8 ms"', '"40 ms"'))
+    steps = '[[step]]\nto = { x = "30 mm" }\n[[step]]\nhold = "0.5 s"\n'
+    head = (
+        'schema = 1\nkind = "robot-programme"\nname = "side"\nframe = "home"\nspeed = "0.1 m/s"\n'
+    )
+    programme.write_text(head + steps)
+    call = ["sim", "record", str(sim), str(programme), "-o", str(tmp_path / "runs")]
+    recorded = CliRunner().invoke(main, call)
+    assert recorded.exit_code == 0, recorded.output
+    assert recorded.stdout == f"{tmp_path}/runs/side-1.csv\n"
+    run = read_run(tmp_path / "runs" / "side-1.csv")
+    shown = np.stack([run[f"tracker_{axis}"] for axis in "xyz"], axis=1)
+    shown = shown[np.isfinite(shown).all(axis=1)]
+    assert np.linalg.norm(shown[-1] - shown[0]) == pytest.approx(0.03, abs=1e-3)
+    assert all(f"{line}.tension" in run for line in "12345678")
+    refused = CliRunner().invoke(main, [*call, "--rate", "10 Hz"])
+    assert refused.exit_code == 2
+    assert "--rate is of winches" in refused.stderr
+    other = CliRunner().invoke(main, ["sim", "record", "demo-adequate", str(programme)])
+    assert other.exit_code == 2
+    assert "declares no robot" in other.stderr
+
+
 def test_a_robot_is_not_recorded_winch_by_winch() -> None:
     sim = read_simbench(find("sim", "hanging-robot"))
     programme = read_programme(programme_path("programme-demo"))
-    with pytest.raises(UsageError, match="sim serve"):
+    with pytest.raises(UsageError, match="give a robot programme"):
         next(iter(simulate(sim, profiles_of(sim), programme)))

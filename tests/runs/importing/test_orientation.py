@@ -52,7 +52,8 @@ def rotations(kind: str, size: float) -> tuple[Array, Array]:
 def test_components_that_may_be_either_are_asked(kind: str, names: str, tmp_path: Path) -> None:
     values, true = rotations(kind, 0.5)
     (question,) = guessed(tmp_path / "a.csv", names, values).questions
-    assert question.options == ("--orientation vector", "--orientation angles")
+    kinds = ("angles", "vector", "xyz")
+    assert question.options == tuple(f"--orientation {kind}" for kind in kinds)
     guess = guessed(tmp_path / "a.csv", names, values, orientation=kind)
     assert not guess.questions
     assert turned(guess) == pytest.approx(true, abs=1e-7)

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tracker_exports import (
+    aruco,
     leica,
     matrix,
     numbered_quaternion,
@@ -16,6 +18,8 @@ from tracker_exports import (
     poses,
     spatial_analyzer,
     vicon,
+    vicon_helical,
+    vicon_objects,
 )
 from winchkit.arrays import Array
 from winchkit.errors import RunError
@@ -26,7 +30,7 @@ from winchkit.runs.importing.clocks.joint import joined
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of
-from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.importing.streams import Streams, streams_of
 
 
 def guessed(path: Path, write: Callable[[Path], None], answers: Answers | None = None) -> Guess:
@@ -40,7 +44,11 @@ def channels(guess: Guess) -> dict[str, Array]:
 
 
 @pytest.mark.parametrize(
-    "write", [optitrack, vicon, spatial_analyzer, leica, matrix, numbered_quaternion]
+    "write",
+    [
+        *(optitrack, vicon, vicon_objects, vicon_helical, aruco),
+        *(spatial_analyzer, leica, matrix, numbered_quaternion),
+    ],
 )
 def test_every_export_gives_the_same_poses(write: Callable[[Path], None], tmp_path: Path) -> None:
     guess = guessed(tmp_path / "poses.csv", write)
@@ -77,6 +85,104 @@ def test_a_file_without_times_has_the_declared_rate(tmp_path: Path) -> None:
     assert guess.sample_rate == pytest.approx(100.0)
     (stream,) = streams_of(guess).streams
     assert stream.time[-1] == pytest.approx(poses()[0][-1])
+
+
+@pytest.mark.parametrize("kind", ["angles", "vector", "xyz"])
+def test_angles_of_motion_capture_are_asked_by_their_convention(kind: str, tmp_path: Path) -> None:
+    """Large rotations about all axes, whose conventions differ by degrees."""
+    time = np.arange(50) / 100
+    angles = np.stack([0.3 * np.sin(time), 0.2 + 0 * time, 0.4 * np.cos(time)], axis=1)
+    turned = {
+        "angles": Rotation.from_euler("xyz", angles),
+        "vector": Rotation.from_rotvec(angles),
+        "xyz": Rotation.from_euler("XYZ", angles),
+    }
+    head = "Segments\n100\n,,plat:plat,,,,,\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n"
+    head += ",,deg,deg,deg,mm,mm,mm\n"
+    rows = [
+        f"{k + 1},0,{','.join(map(repr, own))},1,2,3"
+        for k, own in enumerate(np.degrees(angles).tolist())
+    ]
+    path = tmp_path / "segments.csv"
+    path.write_text(head + "\n".join(rows) + "\n")
+    (question,) = guess_columns(read_table(path)).questions
+    assert f"--orientation {kind}" in question.options
+    found = channels(guess_columns(read_table(path), Answers(orientation=kind)))
+    if kind == "angles":
+        names = ("platform_roll", "platform_pitch", "platform_yaw")
+        assert np.stack([found[n] for n in names], axis=1) == pytest.approx(angles, abs=1e-9)
+        return
+    quaternion = np.stack([found[f"platform_q{axis}"] for axis in "wxyz"], axis=1)
+    assert rotation_from_quaternion(quaternion) == pytest.approx(turned[kind].as_matrix(), abs=1e-9)
+
+
+def test_of_several_markers_the_user_names_one(tmp_path: Path) -> None:
+    rows = [f"{k},{m},{m + k},2,3,0,0,0.1" for k in range(30) for m in (3, 7)]
+    path = tmp_path / "markers.csv"
+    names = "time [s],marker_id,x [m],y [m],z [m],rvec_x,rvec_y,rvec_z"
+    path.write_text("\n".join([names, *rows]) + "\n")
+    (question,) = guess_columns(read_table(path)).questions
+    assert question.options == ('--body "3"', '--body "7"')
+    found = channels(guess_columns(read_table(path), Answers(body="7")))
+    assert found["platform_x"] == pytest.approx(7 + np.arange(30.0))
+
+
+POINTS = "P003;1300;2;3\nP001;1100;2;3\nCENTRE;0;0;0\nP002;1200;2;3\n"
+"""Of a tracker, in another order, and one that the controller does not have."""
+
+
+def points(folder: Path, text: str, head: str = "") -> tuple[Streams, Streams]:
+    """Motor angles of four points, and a tracker's table."""
+    motors, tracker = folder / "motors.csv", folder / "tracker.txt"
+    motors.write_text(
+        "Point;m1_pos [rad];m2_pos [rad]\n" + "".join(f"P{k:03};{k};-{k}\n" for k in range(5))
+    )
+    tracker.write_text(head + text)
+    answers = Answers(columns=(read_column("platform_x=X [mm]"),))
+    return streams_of(guess_columns(read_table(motors))), streams_of(
+        guess_columns(read_table(tracker), answers)
+    )
+
+
+@pytest.mark.parametrize(
+    ("head", "change"),
+    [
+        ("", lambda t: t),
+        ("Name;X;Y;Z\n", lambda t: t),
+        (
+            "// SpatialAnalyzer 2021\n// Working Frame: A::WORLD\n",
+            lambda t: "".join(f"A,Poses,{row},0,12.7\n" for row in t.replace(";", ",").split()),
+        ),
+        ("", lambda t: "".join(f"A Poses {row}\n" for row in t.replace(";", " ").split("\n")[:-1])),
+    ],
+)
+def test_points_are_joined_by_their_names(
+    head: str, change: Callable[[str], str], tmp_path: Path
+) -> None:
+    whole, (joint,) = joined([*points(tmp_path, change(POINTS), head)])
+    run = run_of(whole, {})
+    assert joint.method == "names"
+    assert run["1.motor_angle"].tolist() == [1, 2, 3]
+    assert run["platform_x"] == pytest.approx([1.1, 1.2, 1.3])
+    assert "P000, P004 of" in joint.text
+    assert "CENTRE of" in joint.text
+
+
+def test_a_point_that_stands_twice_is_not_joined(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"tracker.txt:2: the point 'P001' stands in 2 rows"):
+        joined(
+            [
+                *points(
+                    tmp_path,
+                    POINTS + "P001;1100.2;2;3\n" + "".join(f"Q{k};1;2;3\n" for k in range(9)),
+                )
+            ]
+        )
+
+
+def test_lists_of_different_points_are_not_joined_by_name(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="not as many rows"):
+        joined([*points(tmp_path, POINTS.replace("P", "Q"))])
 
 
 def test_poses_are_joined_row_by_row_with_the_motor_angles(tmp_path: Path) -> None:

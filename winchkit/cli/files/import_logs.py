@@ -150,8 +150,9 @@ class _Written(Quantity):
 )
 @click.option(
     "--orientation",
-    type=click.Choice(("vector", "angles", "wxyz", "xyzw")),
-    help="What rx, ry, rz are (rotation vector or fixed angles), or the order of q0 to q3.",
+    type=click.Choice(("vector", "angles", "xyz", "wxyz", "xyzw")),
+    help="What rx, ry, rz are (rotation vector, angles of Rz Ry Rx, or of Rx Ry Rz), or the order "
+    "of q0 to q3.",
 )
 @click.option(
     "--motion",

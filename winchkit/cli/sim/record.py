@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit import wings
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -18,6 +20,10 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme
+    from winchkit.schema.robot_programme import RobotProgramme
+
+_RATE = 50.0
+"""Hz."""
 
 
 @click.command(
@@ -26,6 +32,9 @@ if TYPE_CHECKING:
     examples=(
         "winchkit sim record demo-elastic-rope programme-demo -o runs",
         "winchkit sim record spiral-bench short.toml --seed 3 --hidden 'elastic rope'",
+        Example(
+            "winchkit sim record cabtive-robot robot-star.toml -o runs", "needs a robot programme"
+        ),
     ),
 )
 @click.argument("bench", type=SIM_BENCH)
@@ -42,9 +51,7 @@ if TYPE_CHECKING:
 @click.option(
     "--rate",
     type=Quantity("frequency", example="50 Hz"),
-    default="50 Hz",
-    show_default=True,
-    help="Sampling rate.",
+    help=f"Sampling rate, by default {_RATE:g} Hz; a robot's log has the rows of its bench.",
 )
 @output_option(
     "Folder for the runs.",
@@ -71,19 +78,20 @@ def command(
     programmes: tuple[str, ...],
     more: tuple[str, ...],
     seed: int,
-    rate: str,
+    rate: str | None,
     output: Path,
     suffix: str,
     hidden: tuple[str, ...],
 ) -> None:
     """Run PROGRAMMEs on a simulated BENCH without buses; write one run per load and repeat.
 
-    A PROGRAMME is a file, or a shipped name such as programme-demo.
+    A PROGRAMME is a file, or a shipped name such as programme-demo. A robot programme moves the
+    platform of a robot by its bench, with buses, in simulated time.
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
-    from winchkit.runs import write_run
-    from winchkit.schema.read import read_programme, read_simbench
+    from winchkit.runs import read_run
+    from winchkit.schema.read import load, read_programme, read_simbench
     from winchkit.sim.bench import hiding, profiles_of, programme_path
     from winchkit.sim.record import simulate
 
@@ -91,7 +99,7 @@ def command(
     if hidden:
         declared = hiding(declared, hidden)
     profiles = profiles_of(declared)
-    hertz = quantity(rate, "frequency")
+    hertz = _RATE if rate is None else quantity(rate, "frequency")
     named = (*programmes, *more)
     if not named:
         raise UsageError(
@@ -100,25 +108,48 @@ def command(
     written: list[dict[str, object]] = []
     with progress_bar() as progress:
         for index, name in enumerate(named):
-            programme = read_programme(programme_path(name))
-            for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
-                path = output / f"{run.name}.{suffix}"
-                output.mkdir(parents=True, exist_ok=True)
-                write_run(run, path)
-                written.append(_entry(path, run, programme))
-                done = index / len(named) if len(named) > 1 else None
-                progress(f"{programme.name}: {path.name} written", done)
+            path, done = programme_path(name), index / len(named) if len(named) > 1 else None
+            value = load(path).value
+            if (of_wing := wings.call("record", value)) is not None:
+                if rate is not None:
+                    raise UsageError(
+                        "--rate is of winches; a robot's log has the rows of its bench"
+                    )
+
+                def tell(what: str, share: float | None = done) -> None:
+                    progress(what, share)
+
+                found = of_wing(value, declared, output, f".{suffix}", seed=seed, tell=tell)
+                runs = ((file, read_run(file)) for file in found)
+            else:
+                value = read_programme(path)
+                made = simulate(declared, profiles, value, seed=seed, rate=hertz)
+                runs = _written(made, output, suffix)
+            for file, run in runs:
+                written.append(_entry(file, run, value))
+                progress(f"{value.name}: {file.name} written", done)
                 if not is_json():
-                    click.echo(path)
+                    click.echo(file)
     if is_json():
         echo_json({"schema": 1, "bench": bench, "seed": seed, "runs": written})
-    winches = declared.bench.winch
-    words = ["-p", next(iter(winches.values())).profile]
-    words += ["--winch", "all"] if len(winches) > 1 else []
+    winches, robot = declared.bench.winch, declared.bench.robot
+    words = ["-p", robot.profile if robot else next(iter(winches.values())).profile]
+    words += ["--winch", "all"] if len(winches) > 1 and not robot else []
     suggest_next("compare", sorted(str(entry["path"]) for entry in written), *words)
 
 
-def _entry(path: Path, run: Run, programme: Programme) -> dict[str, object]:
+def _written(runs: Iterable[Run], folder: Path, suffix: str) -> Iterator[tuple[Path, Run]]:
+    """Write runs as they are simulated."""
+    from winchkit.runs import write_run
+
+    for run in runs:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"{run.name}.{suffix}"
+        write_run(run, path)
+        yield path, run
+
+
+def _entry(path: Path, run: Run, programme: Programme | RobotProgramme) -> dict[str, object]:
     return {
         "path": str(path),
         "programme": programme.name,

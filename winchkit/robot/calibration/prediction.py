@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import rotation_of, rotation_vector
+from winchkit.robot.files.poses import held_unmeasured
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import reading_of, registered
@@ -49,7 +50,8 @@ def errors_at(equations: Equations, values: Array, predicted: Pose | None = None
     unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
     measured = equations.measured
     pose = _reading(equations, values, found)
-    vector = pose.position - measured.position
+    held = held_unmeasured(measured, equations.robot.profile)
+    vector = np.where(held, 0.0, pose.position - measured.position)
     distance = np.linalg.norm(vector, axis=1)
     angle = np.full(len(distance), np.nan)
     whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])

@@ -84,6 +84,10 @@ def _instruments(document: Any, found: Calibrated) -> None:
     own = found.equations.instruments_at(found.values)
     if own is None or not own.free & set(NUMBERS):
         return
+    if document["home"].pop("frame", "base") == "tracker":
+        home = found.equations.robot.home
+        document["home"]["position"] = _vector(home.position[0], "mm")
+        document["home"]["rotation"] = _vector(angles_of(home.rotation[0]), "deg")
     tables = document.setdefault("instrument", tomlkit.table(is_super_table=True))
     table = tables.setdefault("tracker", tomlkit.table())
     tracker = own.trackers[0]

@@ -15,7 +15,6 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
-    from winchkit.bench.tracker import Tracker
     from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.robot.bench.computation import Computation
     from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
 
 _FEWEST = 10
 """Poses from which a fit of those of a stopped calibration is suggested."""
-_INSTRUMENTS = 0.5
-"""Time in which every instrument of a simulated bench has been read, s."""
 
 
 def pose_names(output: Path) -> dict[str, Path]:
@@ -63,43 +60,32 @@ class PoseSeries:
             ComputationProcess() as compute,
             open_bench(path, name=client_name("calibrate"), realtime="try") as opened,
         ):
-            tracker = opened.tracker
-            assert tracker is not None, "the bench file declares it"
-            return self._calibrated(opened, tracker, keep, compute)
+            return self._calibrated(opened, keep, compute)
 
     def simulated(self, name: str) -> SelfCalibration:
         """Calibrate a simulated robot, by the same loop and frames in simulated time."""
-        from winchkit.bench.open import open_bench
-        from winchkit.bench.tracker import Tracker
         from winchkit.catalog import find
+        from winchkit.robot.cli.simulated import simulated_robot
         from winchkit.schema.read import read_simbench
-        from winchkit.sim.clock.simulated_clock import SimulatedClock
-        from winchkit.sim.live.bench import LiveBench
 
         sim = read_simbench(find("sim", name))
         self._check(sim.bench, name)
-        clock = SimulatedClock()
-        with self._kept() as keep, LiveBench(sim, simulated_time=clock, compiled=True) as live:
-            assert live.robot is not None, "the bench has a robot"
-            tracker = Tracker(clock.now)
-            live.robot.on_pose = tracker.receive
-            with open_bench(live.bench_spec, clock) as opened:
-                clock.sleep(_INSTRUMENTS)
-                return self._calibrated(opened, tracker, keep)
+        with self._kept() as keep, simulated_robot(sim) as opened:
+            return self._calibrated(opened, keep)
 
     def _calibrated(
         self,
         bench: Bench,
-        tracker: Tracker,
         keep: Callable[[Run], None],
         compute: Computation | None = None,
     ) -> SelfCalibration:
         from winchkit.robot.bench.computation import at_once
         from winchkit.robot.bench.self_calibration import self_calibrated
 
+        assert bench.tracker is not None, "the bench file declares it"
         found = self_calibrated(
             bench,
-            tracker,
+            bench.tracker,
             poses=self.poses,
             validation=self.validation,
             volume=self.volume,

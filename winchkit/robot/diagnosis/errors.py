@@ -25,6 +25,7 @@ from winchkit.diagnosis.results import OutputFit
 from winchkit.model.rotation import rotation_by, skew
 from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.regression import PoseRegression
+from winchkit.robot.files.poses import held_unmeasured
 from winchkit.robot.identification.variance_components import PoseNoise
 
 Errors = dict[str, Array]
@@ -62,7 +63,7 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
         known_closure = np.where(whole, np.nan_to_num(residuals["closure"]), np.nan)
         found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]
         if np.isfinite(found).any():
-            out["platform_position"] = found
+            out["platform_position"] = np.where(_held(regression), 0.0, found)
     if "tension" in residuals:
         out["tension"] = -residuals["tension"]
     return out
@@ -131,7 +132,9 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     whole = spread @ np.swapaxes(spread, 1, 2) + sigma["closure"] ** 2 * np.eye(by.shape[1])
     length = np.trace(at_pose @ whole @ np.swapaxes(at_pose, 1, 2), axis1=1, axis2=2)
     out = {"cable_length": float(np.sqrt(np.mean(length) / by.shape[1]))}
-    place = np.sum(to_place**2, axis=(1, 2)) * sigma["closure"] ** 2 + 3 * sigma["position"] ** 2
+    seen = ~_held(regression)
+    place = np.sum(to_place[:, seen] ** 2, axis=(1, 2)) * sigma["closure"] ** 2
+    place += np.count_nonzero(seen) * sigma["position"] ** 2
     out["platform_position"] = float(np.sqrt(np.mean(place)))
     out["tension"] = sigma["tension"]
     return out
@@ -250,9 +253,14 @@ def _signals(regression: PoseRegression) -> Errors:
     length = regression.residuals(())["closure"] + by_drum
     return {
         "cable_length": length,
-        "platform_position": measured.position,
+        "platform_position": np.where(_held(regression), 0.0, measured.position),
         "tension": measured.tension,
     }
+
+
+def _held(regression: PoseRegression) -> NDArray[np.bool_]:
+    """Coordinates that guides hold and nothing measured, (3,)."""
+    return held_unmeasured(regression.dataset.measured, regression.dataset.robot)
 
 
 def held_out_rms(model: FittedModel) -> dict[str, float]:

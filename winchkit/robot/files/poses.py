@@ -23,6 +23,7 @@ from winchkit.errors import Fault, RunError, suggest
 from winchkit.model.rotation import angles_of, rotation_from_quaternion
 from winchkit.robot.files.holds import averaged, holds_of, is_log
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.instruments import TrackerSpec
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -91,6 +92,10 @@ _REST = 0.25
 points stops at each for less."""
 _LEAST_TURN = 2e-3
 """Turn of a drum below which poses are the same, rad: 0.1 mm of cable on a radius of 50 mm."""
+_AS_BASE = (
+    "positions are tracker_x, tracker_y, tracker_z, taken as those in the base frame: where the "
+    'tracker stands in another one, write [instrument.tracker] frame = "unknown" into the profile'
+)
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
 _CIRCULAR = frozenset({"angles", "swivel"})
 """Whose mean over a hold is the circular one."""
@@ -168,6 +173,12 @@ def _numbers(poses: Measured) -> Iterator[bytes]:
     table = [getattr(poses, name) for name in _ARRAYS if name not in {"run", "place"}]
     for row in np.hstack(table):
         yield np.asarray(row + 0.0).tobytes()
+
+
+def held_unmeasured(measured: Measured, profile: RobotProfile) -> NDArray[np.bool_]:
+    """Coordinates of a position that guides hold and nothing measured, (3,): in no distance."""
+    seen = np.any(np.isfinite(measured.position), axis=0)
+    return ~seen & (np.array(profile.platform.free[:3]) == 0)
 
 
 def of_poses(mask: NDArray[np.bool_]) -> str:
@@ -310,7 +321,11 @@ def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, li
         session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    return found[moved], [*_partly(run), *_gaps(found, moved)]
+    notes = [*_partly(run, profile), *_gaps(found, moved, profile)]
+    is_base = _position_columns(run) is _TRACKED and own.tracker.frame == TrackerSpec.frame
+    if is_base and np.any(np.isfinite(found.position)):
+        notes.append(_AS_BASE)
+    return found[moved], notes
 
 
 def _position_columns(run: Run) -> tuple[str, ...]:
@@ -349,9 +364,10 @@ def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
     return found, [note]
 
 
-def _partly(run: Run) -> list[str]:
+def _partly(run: Run, profile: RobotProfile) -> list[str]:
     """Notes on incomplete groups of columns, which are valid but often a misspelling."""
-    given, lacking = _present(run, _position_columns(run))
+    columns = zip(_position_columns(run), profile.platform.free, strict=False)
+    given, lacking = _present(run, [name for name, free in columns if free or name in run])
     if not given or not lacking:
         return []
     return [
@@ -360,13 +376,13 @@ def _partly(run: Run) -> list[str]:
     ]
 
 
-def _gaps(found: Measured, moved: NDArray[np.bool_]) -> list[str]:
+def _gaps(found: Measured, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
     notes = []
     if left := int(np.count_nonzero(~moved)):
         notes.append(f"{left} rows without any motor angle were left out")
     kept = found[moved]
-    for name in ("motor_angle", "position"):
-        values = getattr(kept, name)
+    position = kept.position[:, ~held_unmeasured(kept, profile)]
+    for name, values in (("motor_angle", kept.motor_angle), ("position", position)):
         missing = int(np.count_nonzero(np.isnan(values)))
         if 0 < missing < values.size:
             notes.append(f"{missing} of {values.size} values of {name} are missing")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from winchkit.errors import FileError
-from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.model.rotation import angles_of
+from winchkit.robot.geometry.kinematics import home_of
+from winchkit.robot.geometry.tracker import declared_tracker, pose_behind
+from winchkit.schema.profiles.robot import HomeSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
 from winchkit.schema.reading.lines import Key
@@ -25,7 +29,16 @@ def robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
         }
     if isinstance(lines := tree.get("line"), list):
         tree["line"] = [_line(reading, raw, ("line", n)) for n, raw in enumerate(lines)]
-    return reading.table(RobotProfile, tree)
+    return _with_home(reading.table(RobotProfile, tree))
+
+
+def _with_home(profile: RobotProfile | None) -> RobotProfile | None:
+    """A profile with its home pose in the base frame."""
+    if profile is None or profile.home.frame == "base":
+        return profile
+    home = pose_behind(declared_tracker(profile), home_of(profile))
+    position, angles = home.position[0].tolist(), angles_of(home.rotation)[0].tolist()
+    return replace(profile, home=HomeSpec(tuple(position), tuple(angles)))
 
 
 def _line(reading: Reading, raw: object, at: Key) -> object:

@@ -38,6 +38,10 @@ tracker (0.1 µm)."""
 _RANK = 1e-7
 """Singular values of the length derivatives below this share of the largest count as zero; its
 square is `_RIDGE`, so that both forms of the equations leave out the same motions."""
+_WEAK = 1e-2
+"""The same share for hanging platforms beside a singular pose, such as a level one on four cables
+in two planes of symmetry: there no motion changes one combination of the lengths, and lengths that
+are a micrometre inconsistent have no pose (rule of thumb)."""
 _FLAT = 1e-9
 """Curvatures of the energy below this share of the largest count as zero: above the rounding
 (1e-16) of the largest, and no step along them (rule of thumb)."""
@@ -163,6 +167,11 @@ def forward(
     )
     at_rest = _Search(geometry, given, platform if hanging else None).run(begin, steps)
     best, other = at_rest.best, _Candidates.none(many)
+    if hanging and len(rows := np.flatnonzero(~np.isfinite(best.worst))):
+        at = Pose(begin.position[rows], begin.rotation[rows])
+        again = _Search(geometry, given[rows], platform, _WEAK).run(at, steps)
+        best.put(rows, again.best, np.ones(len(rows), dtype=bool))
+        at_rest.forces[rows] = again.forces
     if not hanging:
         limit = _outlying(best.worst) if search == "outlying" else search
         unmet = np.flatnonzero(np.all(np.isfinite(given), axis=1) & ~(best.worst <= limit))
@@ -347,6 +356,8 @@ class _Search:
     geometry: Geometry
     given: Array
     platform: PlatformSpec | None
+    rank: float = _RANK
+    """Share of the largest singular value below which one is zero, of a hanging platform."""
 
     def run(self, start: Pose, steps: int) -> _AtRest:
         """Step all poses until each has converged or has failed."""
@@ -438,7 +449,7 @@ class _Search:
         weight = gravity_wrench(platform, at.rotation)
         left, values, right = np.linalg.svd(slope)
         count = slope.shape[1]
-        keep = values > _RANK * values[:, :1]
+        keep = values > self.rank * values[:, :1]
         inverse = np.where(keep, 1 / np.where(keep, values, 1.0), 0.0)
         # slope⁺ = V S⁺ Uᵀ; the rest of V spans the motions that keep every length.
         range_ = np.swapaxes(right[:, :count], 1, 2) * inverse[:, None]

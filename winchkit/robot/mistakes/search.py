@@ -164,7 +164,10 @@ class _Search:
     @property
     def motion(self) -> float:
         """Rms motion of the cables about their mean, m; at most a fifth of the robot's size."""
-        moved = self.robot.lengths_at(self.measured.motor_angle)
+        return self._motion_of(self.measured)
+
+    def _motion_of(self, table: Measured) -> float:
+        moved = self.robot.lengths_at(table.motor_angle)
         spread = float(np.sqrt(np.mean(np.var(moved, axis=0))))
         return min(spread, 0.2 * self.robot.geometry.size)
 
@@ -191,6 +194,8 @@ class _Search:
         best = [plain]
         for count in (1, 2) if plain.error > _POOR * self.motion else (1,):
             trials = [self._adjusted(t.mistakes) for t in self._compared(count)]
+            # Motor angles in a smaller unit have a smaller misfit, whatever the positions are.
+            trials = [t for t in trials if t.error <= _WRONG * self._motion_of(t.table)]
             trials.sort(key=lambda trial: trial.error)
             if trials and trials[0].error * _FACTOR < best[0].error:
                 least = trials[0].error

@@ -152,8 +152,8 @@ class Answers:
     signed: tuple[str, ...] = ()
     """Columns whose sign is lost and restored."""
     orientation: str = ""
-    """``vector`` or ``angles`` for ``rx``, ``ry``, ``rz``; ``wxyz`` or ``xyzw`` for ``q0`` to
-    ``q3``; empty where the values say it."""
+    """``vector``, ``angles`` or ``xyz`` for ``rx``, ``ry``, ``rz``; ``wxyz`` or ``xyzw`` for ``q0``
+    to ``q3``; empty where the values say it."""
     motion: str = ""
     """``linear`` for a position and a force, ``rotary`` for an angle and a torque; empty where the
     columns say it."""

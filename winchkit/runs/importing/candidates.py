@@ -17,6 +17,7 @@ from winchkit.runs.importing.orientation import (
     body_of,
     chosen_body,
     complete_sets,
+    is_turned_axis,
     quaternion_names,
     quaternion_order,
     vector_names,
@@ -34,7 +35,7 @@ from winchkit.runs.importing.unit_spelling import (
 )
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.linear_axis import CHANNELS, ROTARY
-from winchkit.schema.mapping import DATE, MATRIX, POSE_DIMENSIONS
+from winchkit.schema.mapping import ANGLES, DATE, MATRIX, POSE_DIMENSIONS, QUATERNION
 
 _BY_DIMENSION = {
     "time": "time",
@@ -111,6 +112,13 @@ def choose(
             choice.unused += [replace(i, channel="", reason="number of the row") for i in times]
         times = even or times
     poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
+    if not any(item.channel == QUATERNION[0] for item in poses):
+        angle = dict(zip(QUATERNION[1:], ANGLES, strict=True))
+        poses = [
+            replace(item, channel=angle[item.channel]) if is_turned_axis(item.column) else item
+            for item in poses
+        ]
+        free = [*(item for item in free if item.channel not in (*POSE_DIMENSIONS, *MATRIX)), *poses]
     exact = [item for item in free if item.rank == 0 and item not in times]
     others = [i for i in free if i not in times and i not in poses and i not in exact]
     _choose_times(table, times, choice)

@@ -22,7 +22,7 @@ from winchkit.runs.importing.assignment import (
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
-from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis
+from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis, marker_column
 from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
 from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
@@ -35,6 +35,8 @@ from winchkit.schema.mapping import DATE
 def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     """Guess what the columns of a table are."""
     answers = answers or Answers()
+    if answers.axis is None and not answers.kind and (marker := marker_column(table)) is not None:
+        answers = replace(answers, kind=marker.source)
     if answers.kind:
         kinds = by_kind(table, answers.kind)
         found = guess_columns(kinds, replace(answers, kind="", axis=answers.axis or ""))

@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column, Table, named_apart
 
+_MARKERS = frozenset(("marker id", "marker", "tag id", "tag", "aruco id", "fiducial id"))
+"""Titles of a column that names the marker whose pose a row has."""
 _MOST = 64
 """Axes of one table."""
 _ROWS = 10
@@ -88,6 +91,15 @@ def _rows_of(table: Table, by: str, what: str) -> tuple[Column, dict[str, NDArra
         )
         raise RunError(Fault(message, table.path))
     return key, {name: np.flatnonzero(names == name) for name in found}
+
+
+def marker_column(table: Table) -> Column | None:
+    """The column that names the marker of each row, of several markers of a camera."""
+    for column in table.columns:
+        names = _names(column) if words_of(column.name) in _MARKERS else None
+        if names is not None and 1 < len(set(names.tolist()) - {""}) <= _MOST:
+            return column
+    return None
 
 
 def likely_axis(table: Table) -> Column | None:

@@ -105,13 +105,18 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         )
         for axis in "wxyz"
     ),
-    (r"^(roll|rx|rot ?x|a rx|euler x)$|\broll\b", 1, "platform_roll"),
-    (r"^(pitch|ry|rot ?y|a ry|euler y)$|\bpitch\b", 1, "platform_pitch"),
-    (r"^(yaw|rz|rot ?z|a rz|euler z)$|\byaw\b", 1, "platform_yaw"),
     *(
         (
-            rf"^({axis}|p{axis}|pos(ition)? {axis}|{axis} pos(ition)?|t{axis}|{axis} coord\w*|"
-            rf".* position {axis}|translation {axis})$",
+            rf"^(r{axis}|rot ?{axis}|a r{axis}|euler {axis}|rvec {axis})$|\b{name}\b",
+            1,
+            f"platform_{name}",
+        )
+        for axis, name in (("x", "roll"), ("y", "pitch"), ("z", "yaw"))
+    ),
+    *(
+        (
+            rf"^({axis}|p{axis}|pos(ition)? {axis}|{axis} pos(ition)?|t(vec ?)?{axis}|"
+            rf"{axis} coord\w*|.* position {axis}|translation {axis})$",
             1,
             f"platform_{axis}",
         )
@@ -243,9 +248,11 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
 
 def _axis_of(labels: tuple[str, ...], words: str) -> str:
     """``rotation x`` of a tracker's column ``X`` below ``Rotation``."""
+    above = words_of(" ".join(labels))
+    if "quaternion" in above and words in {"rx", "ry", "rz", "rw"}:
+        return f"rotation {words[1]}"
     if words not in {"x", "y", "z", "w"}:
         return ""
-    above = words_of(" ".join(labels))
     if "rotation" in above or "quaternion" in above or "orientation" in above:
         return f"rotation {words}"
     return f"position {words}" if words != "w" else "rotation w"

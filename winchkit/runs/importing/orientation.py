@@ -7,70 +7,107 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
 from winchkit.runs.importing.assignment import ChosenColumn, Question, Work
+from winchkit.runs.importing.formats.header import VICON
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column
-from winchkit.schema.mapping import ANGLES, MATRIX, POSITION, QUATERNION, VECTOR
+from winchkit.schema.mapping import ANGLES, EULER, MATRIX, POSITION, QUATERNION, VECTOR
 
-_OPEN = re.compile(r"(a )?r(ot)? ?[xyz]")
-"""Names of components of a rotation, which may be fixed angles or a rotation vector."""
+_OPEN = re.compile(r"(a )?r(ot|vec)? ?[xyz]")
+"""Names of components of a rotation, which may be angles or a rotation vector."""
+_AXES = re.compile("[xyz]")
+_TURNS = ("rotation", "quaternion", "orientation")
+"""Words above the axes of a rotation."""
 _ALIKE = math.radians(0.05)
 """Difference below which the convention has no influence: accuracy of a tracker's angles."""
 _SMOOTHER = 5.0
-"""Ratio of the largest steps of both conventions from which the continuous one is taken."""
+"""Ratio of the largest steps of the two smoothest conventions from which the first is taken."""
 _BEYOND = 1.001
 """Factor by which rounded angles exceed their range."""
+_CONVENTIONS: dict[str, tuple[str, Callable[[Array], Array], str]] = {
+    "angles": ("", lambda own: rotation_of(*own.T), "angles of R = Rz Ry Rx (roll, pitch, yaw)"),
+    "vector": (VECTOR, rotation_by, "a rotation vector"),
+    "xyz": (
+        EULER,
+        # The inverse of a product has the factors with the other sign in the other order.
+        lambda own: np.swapaxes(rotation_of(*-own.T), -1, -2),
+        "angles of R = Rx Ry Rz",
+    ),
+}
+"""By answer: how it is stored, its rotations (p, 3, 3) of three numbers (p, 3), and words."""
+_USUAL = ("angles", "vector")
+"""Conventions of programs that are not known to have others."""
+
+
+def rotation_as(stored: str) -> Callable[[Array], Array] | None:
+    """Rotations of numbers that are stored so; None for roll, pitch and yaw."""
+    found = (turned for own, turned, _ in _CONVENTIONS.values() if own == stored and own)
+    return next(found, None)
 
 
 def settle_orientation(work: Work) -> None:
-    """Decide whether ``rx``, ``ry``, ``rz`` are fixed angles or a rotation vector, or ask.
+    """Decide of which convention three numbers of a rotation are, or ask.
 
     Notes
     -----
     A pitch beyond ±π/2 is none, and a rotation vector is not longer than π. Else the convention
-    counts whose largest step from row to row is five times smaller; small angles are alike in both.
+    counts whose largest step from row to row is five times smaller; small rotations are alike in
+    all. Degrees are angles, but in exports of Vicon and of OptiTrack, which have several kinds.
     """
     found = {item.base: item for item in work.columns if item.base in ANGLES}
     items = [found[name] for name in ANGLES if name in found]
-    is_open = all(_OPEN.fullmatch(words_of(item.column.name)) for item in items)
+    is_open = all(
+        _OPEN.fullmatch(words_of(item.column.name)) or is_turned_axis(item.column) for item in items
+    )
     if len(items) < 3 or not is_open or any(item.factor is None for item in items):
         return
     answer = work.answers.orientation
-    kind = answer if answer in {"vector", "angles"} else _kind(items)
+    kind = answer if answer in _CONVENTIONS else _kind(items, _has_kinds(work.table.metadata))
     names = ", ".join(f"'{item.column.source}'" for item in items)
     if not kind:
-        text = f"{names}: fixed angles (roll, pitch, yaw; R = Rz Ry Rx), or a rotation vector?"
-        options = ("--orientation vector", "--orientation angles")
-        work.questions.append(Question(text, options, "orientation"))
-    elif kind == "vector":
+        words = ", or ".join(text for _, _, text in _CONVENTIONS.values())
+        options = tuple(f"--orientation {name}" for name in _CONVENTIONS)
+        work.questions.append(Question(f"{names}: {words}?", options, "orientation"))
+    elif kind != "angles":
+        stored, _, text = _CONVENTIONS[kind]
         for item in items:
-            item.stored = VECTOR
-        work.notes.append(f"{names} are a rotation vector")
+            item.stored = stored
+        work.notes.append(f"{names} are {text}")
 
 
-def _kind(items: Sequence[ChosenColumn]) -> str:
-    """Convention by the values; empty where both are possible."""
+def _has_kinds(metadata: Mapping[str, str]) -> bool:
+    """Whether a file is of a program that exports rotations in several conventions."""
+    kind = metadata.get("Rotation Type", "Quaternion")
+    return kind != "Quaternion" or not VICON.isdisjoint(metadata.values())
+
+
+def _kind(items: Sequence[ChosenColumn], has_kinds: bool) -> str:
+    """Convention by names and values; empty where several are possible."""
+    above = " ".join(words_of(label) for item in items for label in item.column.labels)
+    if "helical" in above or all(words_of(i.column.name).startswith("rvec") for i in items):
+        return "vector"
     values = np.stack([item.column.values * (item.factor or 1.0) for item in items], axis=1)
     values = values[np.isfinite(values).all(axis=1)]
-    if any(item.unit not in {"rad", ""} for item in items) or not len(values):
+    if not len(values) or (not has_kinds and any(i.unit not in {"rad", ""} for i in items)):
         return "angles"
+    possible = dict(_CONVENTIONS) if has_kinds else {n: _CONVENTIONS[n] for n in _USUAL}
     if np.any(np.abs(values[:, 1]) > _BEYOND * math.pi / 2):
         return "vector"
     if np.any(np.linalg.norm(values, axis=1) > _BEYOND * math.pi):
+        del possible["vector"]
+    turned = {name: convert(values) for name, (_, convert, _) in possible.items()}
+    first = turned["angles"]
+    if all(float(np.max(_turned(other, first))) < _ALIKE for other in turned.values()):
         return "angles"
-    vector, angles = rotation_by(values), rotation_of(*values.T)
-    if float(np.max(_turned(vector, angles))) < _ALIKE:
-        return "angles"
-    steps = [float(np.max(_turned(r[1:], r[:-1]), initial=0.0)) for r in (vector, angles)]
-    if max(steps) < _SMOOTHER * min(steps):
-        return ""
-    return "vector" if steps[0] < steps[1] else "angles"
+    steps = {n: float(np.max(_turned(r[1:], r[:-1]), initial=0.0)) for n, r in turned.items()}
+    best, *others = sorted(steps, key=lambda name: steps[name])
+    return "" if any(steps[n] < _SMOOTHER * steps[best] for n in others) else best
 
 
 def _turned(first: Array, second: Array) -> Array:
@@ -94,7 +131,14 @@ _NOT_A_BODY = re.compile(
     r"^(rigid body|rigid body marker|marker|bone|type|name|position|rotation|orientation|"
     r"mean marker error|marker quality|trajectories|pose pose|pose|transform)$"
 )
-_AXES = re.compile("[xyz]")
+_KIND_OF_BODY = re.compile(r"^Global Angle( \(\w+\))? ")
+"""What Vicon writes before the name of an object."""
+
+
+def is_turned_axis(column: Column) -> bool:
+    """Whether a column is one of X, Y and Z below the word ``Rotation``."""
+    above = words_of(" ".join(column.labels))
+    return words_of(column.name) in {"x", "y", "z"} and any(word in above for word in _TURNS)
 
 
 def body_of(column: Column) -> str:
@@ -102,7 +146,8 @@ def body_of(column: Column) -> str:
 
     Returns: labels without words such as ``Rigid Body`` and ``Position``.
     """
-    own = [text for text in column.labels if not _NOT_A_BODY.match(words_of(text))]
+    labels = [_KIND_OF_BODY.sub("", text) for text in column.labels]
+    own = [text for text in labels if not _NOT_A_BODY.match(words_of(text))]
     return " ".join(own) or column.group
 
 

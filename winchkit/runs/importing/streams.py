@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault
-from winchkit.model.rotation import quaternion_of, rotation_by
+from winchkit.model.rotation import quaternion_of
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.clocks.point_names import names_of_points
 from winchkit.runs.importing.clocks.row_order import STILL, rows_in_order
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
+from winchkit.runs.importing.orientation import rotation_as
 from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
-from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP, VECTOR
+from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP
 
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
@@ -68,6 +70,8 @@ class Streams:
     notes: tuple[str, ...] = field(default=())
     wraps: Mapping[str, float] = field(default_factory=dict)
     """Range in SI of every channel whose numbers wrap."""
+    names: tuple[Sequence[str], ...] = ()
+    """Columns that may be the names of points, a text per row of the table."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -100,7 +104,8 @@ def streams_of(guess: Guess) -> Streams:
         key = clock.source if clock is not None else f"\0{len(column)}"
         blocks.setdefault(key, {})[item.channel] = column.values
     assigned = {item.channel: item for item in guess.used}
-    is_vector = any(item.stored == VECTOR for item in guess.used)
+    conventions = [rotation_as(item.stored) for item in guess.used if item.channel in ANGLES]
+    convention = next(filter(None, conventions), None)
     streams = []
     for key, channels in blocks.items():
         first, time, _ = read.get(key, (0.0, None, False))
@@ -120,7 +125,7 @@ def streams_of(guess: Guess) -> Streams:
         notes += [*early, *note]
         # Numbers that wrap are unwrapped in the order of time, without the rows left out.
         known = {name: _in_si(own, assigned[name]) for name, own in stream.channels.items()}
-        stream = replace(stream, channels=_with_quaternion(known, is_vector=is_vector))
+        stream = replace(stream, channels=_with_quaternion(known, convention))
         streams += _by_rate(stream)
     is_absolute = bool(absolute) and len(absolute) == len(read)
     return Streams(
@@ -133,6 +138,7 @@ def streams_of(guess: Guess) -> Streams:
         tuple(faults),
         tuple(notes),
         {item.channel: range_of(item.stored) * abs(item.factor) for item in guess.used},
+        names_of_points(table, used),
     )
 
 
@@ -231,14 +237,16 @@ def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
     return before[-1] if before else own[0] if own else None
 
 
-def _with_quaternion(channels: dict[str, Array], *, is_vector: bool) -> dict[str, Array]:
-    """A quaternion in place of a rotation vector or of the elements of a rotation matrix."""
-    names = ANGLES if is_vector and set(ANGLES) <= channels.keys() else MATRIX
+def _with_quaternion(
+    channels: dict[str, Array], convention: Callable[[Array], Array] | None
+) -> dict[str, Array]:
+    """A quaternion in place of numbers of a convention, or of the elements of a matrix."""
+    names = ANGLES if convention and set(ANGLES) <= channels.keys() else MATRIX
     others = {name: values for name, values in channels.items() if name not in names}
     if not set(names) <= channels.keys():
         return others
     parts = np.stack([channels[name] for name in names], axis=-1)
-    matrix = rotation_by(parts) if names is ANGLES else parts.reshape(-1, 3, 3)
+    matrix = convention(parts) if convention and names is ANGLES else parts.reshape(-1, 3, 3)
     return {**others, **_quaternion(matrix)}
 
 

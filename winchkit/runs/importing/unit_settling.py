@@ -38,7 +38,7 @@ _TURN = 2 * math.pi
 _AXES = (set(POSITION), set(ANGLES))
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
-_SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta"}
+_SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta", "rvec"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 
 _LARGEST_OF_JOINT = 1.02 * 2 * math.pi

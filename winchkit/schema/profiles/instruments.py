@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import asin, atan2, hypot
 from typing import Annotated, Literal
 
 from winchkit.errors import UsageError, suggest
@@ -30,6 +31,32 @@ class FrameSpec:
     """m."""
     rotation: Vector
     """Roll, pitch and yaw, rad."""
+
+
+_LEAST_LEVEL = 0.1
+"""Level share of the way from origin to x_point below which an error of ``up`` turns the x axis by
+ten times itself (rule of thumb)."""
+
+
+def _through(origin: Vector, x_point: Vector, up: Vector) -> FrameSpec:
+    """Frame with its origin in a measured point, z upwards, and x towards a second point.
+
+    Raises UsageError where the second point lies above, below or in the first one.
+    """
+    way = [b - a for a, b in zip(origin, x_point, strict=True)]
+    z = [k / hypot(*up) for k in up]
+    height = sum(a * k for a, k in zip(way, z, strict=True))
+    x = [a - height * k for a, k in zip(way, z, strict=True)]
+    length = hypot(*x)
+    if length <= _LEAST_LEVEL * hypot(*way):
+        raise UsageError(
+            f"x_point is {length * 1e3:g} mm beside origin across up, on a way of "
+            f"{hypot(*way) * 1e3:g} mm, which gives no x axis; measure a point on the x axis, far "
+            "from origin"
+        )
+    x = [k / length for k in x]
+    y2 = z[0] * x[1] - z[1] * x[0]
+    return FrameSpec(origin, (atan2(y2, z[2]), -asin(x[2]), atan2(x[1], x[0])))
 
 
 @dataclass(frozen=True)
@@ -66,17 +93,30 @@ class _Frame(Marker):
         """Description of the expected value."""
         return (
             f'"{UNKNOWN}" or {{ position = ["0 mm", "0 mm", "0 mm"], '
-            'rotation = ["0 deg", "0 deg", "0 deg"] }'
+            'rotation = ["0 deg", "0 deg", "0 deg"] } or measured points '
+            '{ origin = ["0 mm", "0 mm", "0 mm"], x_point = ["1 m", "0 mm", "0 mm"] }'
         )
 
     def read(self, raw: object) -> FrameSpec | Unknown:
         """Convert a value of a file to SI; raises UsageError with the reason."""
         if raw == UNKNOWN:
             return "unknown"
-        if not isinstance(raw, dict) or set(raw) != {"position", "rotation"}:
+        keys = set(raw) - {"up"} if isinstance(raw, dict) else set()
+        if keys not in ({"position", "rotation"}, {"origin", "x_point"}) or (
+            "up" in raw and "origin" not in raw
+        ):
             raise UsageError(f"expected {self.wanted}, not {raw!r}")
+        length = Quantity("length")
+        if "origin" in keys:
+            origin, x_point = (
+                _vector(raw[key], length, self.wanted) for key in ("origin", "x_point")
+            )
+            up = _vector(raw.get("up", (0, 0, 1)), Quantity("ratio"), self.wanted)
+            if not any(up):
+                raise UsageError("up is zero; it is the direction against gravity")
+            return _through(origin, x_point, up)
         return FrameSpec(
-            _vector(raw["position"], Quantity("length"), self.wanted),
+            _vector(raw["position"], length, self.wanted),
             _vector(raw["rotation"], Quantity("angle"), self.wanted),
         )
 
@@ -134,7 +174,9 @@ class TrackerSpec(Table):
     """Instrument that measures positions, and rotations where no IMU is declared."""
 
     frame: Frame = FrameSpec(_NONE, _NONE)
-    """Pose of the robot's base frame in the tracker's; one per session where it is unknown."""
+    """Pose of the robot's base frame in the tracker's, by its numbers or by points that the tracker
+    measured: the origin, a point towards x, and the direction against gravity (z of a levelled
+    tracker). One per session where it is unknown."""
     reflector: Place = _NONE
     """Observed point in the platform's frame, m."""
     scale: Ratio = 0.0

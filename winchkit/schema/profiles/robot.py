@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from winchkit.rendering import Plotted
-from winchkit.schema.profiles.instruments import InstrumentSpec
+from winchkit.schema.profiles.instruments import UNKNOWN, InstrumentSpec
 from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
 from winchkit.schema.quantity import (
     Angle,
@@ -107,6 +107,9 @@ class HomeSpec(Table):
     position: Point
     rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
     """Roll, pitch, yaw; R = Rz(yaw) Ry(pitch) Rx(roll), platform to base."""
+    frame: Literal["base", "tracker"] = "base"
+    """Of the two above; ``tracker`` for a pose as the tracker showed it, which the reader of the
+    file converts."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,14 @@ class RobotProfile(Plotted, Table):
         for key, name in self.instrument.lines():
             if name not in names:
                 yield f"instrument.{key}", f"no line '{name}'; the lines are {', '.join(names)}"
-        if self.instrument.tracker.datum == "tracker" and not all(self.platform.free):
+        tracker = self.instrument.tracker
+        if self.home.frame == "tracker" and UNKNOWN in (tracker.frame, tracker.reflector):
+            message = (
+                "needs the frame and the reflector of [instrument.tracker], one of which is "
+                f"'{UNKNOWN}'; write the pose in the base frame, or measure what is unknown"
+            )
+            yield "home.frame", message
+        if tracker.datum == "tracker" and not all(self.platform.free):
             message = "degrees_of_freedom are along base axes, which stay; use datum = 'robot'"
             yield "instrument.tracker.datum", message
         seen: dict[Point, str] = {}

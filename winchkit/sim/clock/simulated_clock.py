@@ -57,6 +57,7 @@ class SimulatedClock:
         self._stalled_until = -inf
         self._can: dict[str, Callable[[], Any]] = {}
         self._serial: dict[str, Callable[[], Any]] = {}
+        self._datagrams: dict[str, Callable[[bytes], None]] = {}
         self.listeners: dict[tuple[str, int], Any] = {}
         """TCP servers of the simulated network by host and port, see ``event_loop``."""
         self.reply_filter: Callable[[bytes], bytes] | None = None
@@ -201,6 +202,31 @@ class SimulatedClock:
         """
         connect = self._serial.get(port)
         return None if connect is None else connect()
+
+    def receive_datagrams(self, address: str, take: Callable[[bytes], None]) -> None:
+        """Receive what simulated devices send to an address, until another receiver does.
+
+        Parameters
+        ----------
+        address : str
+            ``udp://HOST:PORT``.
+        take : callable
+            Called with each datagram.
+        """
+        self._datagrams[address] = take
+
+    def send_datagram(self, address: str, datagram: bytes) -> None:
+        """Deliver a datagram to who receives at an address; it is lost where nobody does.
+
+        Parameters
+        ----------
+        address : str
+            ``udp://HOST:PORT``.
+        datagram : bytes
+            Its content.
+        """
+        if (take := self._datagrams.get(address)) is not None:
+            take(datagram)
 
     # How threads take turns.
 

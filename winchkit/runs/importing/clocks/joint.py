@@ -1,4 +1,4 @@
-"""Files joined to one run: by time stamps where their clocks agree, else by cross-correlation."""
+"""Files joined to one run: by the names of points, by time stamps, or by cross-correlation."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.clocks.cross_correlation import Agreement
 from winchkit.runs.importing.clocks.lag import agreement_of, shifted, span_of
+from winchkit.runs.importing.clocks.point_names import by_names
 from winchkit.runs.importing.streams import Stream, Streams
 
 _SIGNIFICANT = 3.0
 """Standard deviations of a drift that is applied, and of a lag that contradicts the stamps."""
+
+_ROW_BY_ROW = ("names", "rows")
+"""Methods that put a row of one file beside one of the other."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class Joint:
 
     path: str
     method: str
-    """``time stamps``, ``cross-correlation``, ``given lag`` or ``rows``."""
+    """``time stamps``, ``cross-correlation``, ``given lag``, ``names`` or ``rows``."""
     lag: float
     """s, added to the clock of the file for that of the first one."""
     drift: float
@@ -38,31 +42,34 @@ def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams,
     ``lag``: known difference of the clocks, s: time of the first = time of the others + lag. Raises
     RunError where the difference of the clocks cannot be determined.
     """
-    first = parts[0]
-    streams = list(first.streams)
+    first, more = parts[0], list[Stream]()
     notes, joints = list(first.notes), []
-    faults = [fault for part in parts for fault in part.faults]
+    faults = tuple(fault for part in parts for fault in part.faults)
     for other in parts[1:]:
-        moved, joint = _aligned(first, _as_named(first, other), lag)
+        named = _as_named(first, other)
+        paired = by_names(first, named) if lag is None and not more else None
+        if paired is not None:
+            first, moved, text = paired
+            joint = Joint(other.path, "names", 0.0, 0.0, text)
+        else:
+            moved, joint = _aligned(first, named, lag)
         joints.append(joint)
         notes += other.notes
-        known = {name for item in streams for name in item.channels}
+        known = {name for item in (*first.streams, *more) for name in item.channels}
         for item in moved.streams:
-            doubled = sorted(known & set(item.channels))
-            if doubled:
+            if doubled := sorted(known & set(item.channels)):
                 notes.append(
                     f"{Path(other.path).name}: {', '.join(doubled)} left out: given before"
                 )
             own = {name: values for name, values in item.channels.items() if name not in known}
-            if own:
-                streams.append(Stream(item.time, own, item.rows))
-    if all(joint.method == "rows" for joint in joints):
-        channels = {name: values for item in streams for name, values in item.channels.items()}
-        streams = [Stream(first.streams[0].time, channels, first.streams[0].rows)]
-    return (
-        replace(first, streams=tuple(streams), faults=tuple(faults), notes=tuple(notes)),
-        tuple(joints),
-    )
+            if own and joint.method in _ROW_BY_ROW:
+                (stream,) = first.streams
+                stream = replace(stream, channels={**stream.channels, **own})
+                first = replace(first, streams=(stream,))
+            elif own:
+                more.append(Stream(item.time, own, item.rows))
+    whole = replace(first, streams=(*first.streams, *more), faults=faults, notes=tuple(notes))
+    return whole, tuple(joints)
 
 
 def _as_named(first: Streams, other: Streams) -> Streams:
@@ -123,7 +130,7 @@ def _by_rows(first: Streams, other: Streams) -> Joint:
         return Joint(other.path, "rows", 0.0, 0.0, text)
     message = (
         f"has no times, and not as many rows as {first.path} ({' and '.join(map(str, counts))}); "
-        "give both files times, e.g. by --sample-rate"
+        "give both files a column with the names of the points, or times, e.g. by --sample-rate"
     )
     raise RunError(Fault(message, other.path))
 

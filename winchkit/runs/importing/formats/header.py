@@ -33,6 +33,8 @@ _UNIT_ROW = {"unit", "units", "unit symbol", "einheit"}
 """First cells of the rows of a header that has the title of each row above the times."""
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
+VICON = frozenset(("Trajectories", "Model Outputs", "Devices", "Segments", "Objects", "Joints"))
+"""Titles of the sections of Vicon's exports."""
 _INCREMENT = re.compile(r"t ?inc\w*\s*=\s*(\S+)", re.IGNORECASE)
 _RATEKEYS = re.compile(
     r"(export frame rate|capture frame rate|frame rate|sample ?rate|sampling ?rate|"
@@ -124,7 +126,7 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
         cells = _uncommented(rows[cut - 1][1], width)
         given = [cell for cell in cells if cell]
         texts = [cell for cell in given if number(cell, decimal) is None]
-        spread = cells and not cells[0] and len(given) >= 1 and end > cut
+        spread = cells and not cells[0] and given and (end > cut or is_unit_row(cells))
         is_comment = bool(_COMMENT.match(rows[cut - 1][1][0])) if rows[cut - 1][1] else False
         fits = (len(cells) <= width + 1 and not is_comment) or len(cells) == width
         fits = fits or (is_blank and len([c for c in cells if c[:1] not in "(["]) == width)
@@ -134,7 +136,7 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
             continue
         if not given or not fits or (not texts and not spread):
             break
-        if len(given) == 1 and width > 1:
+        if len(given) == 1 and width > 1 and not spread:
             break
         if end > cut and len(given) == 2 and width > 3 and not spread:
             break
@@ -331,7 +333,7 @@ def _interval(metadata: dict[str, str], decimal: str) -> float | None:
 def _rate_alone(metadata: dict[str, str]) -> float | None:
     """Rate in a line of its own under the title of a section, as Vicon writes it, Hz."""
     for title, value in pairwise(metadata.values()):
-        rate = number(value, ".") if title in {"Trajectories", "Model Outputs", "Devices"} else None
+        rate = number(value, ".") if title in VICON else None
         if rate and rate > 0:
             return rate
     return None

@@ -11,6 +11,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.regular_file import read_whole
 from winchkit.runs.importing.formats.cells import with_cell_units
 from winchkit.runs.importing.formats.channel_table import by_channel
+from winchkit.runs.importing.formats.point_table import with_coordinates
 from winchkit.runs.importing.formats.split_stamps import joined_stamps
 from winchkit.runs.importing.table import LARGEST, Table
 
@@ -27,7 +28,7 @@ def read_table(path: str | Path) -> Table:
     """
     table = _read(path)
     units = replace(table, columns=tuple(with_cell_units(item) for item in table.columns))
-    return by_channel(joined_stamps(units))
+    return by_channel(joined_stamps(with_coordinates(units)))
 
 
 def _read(path: str | Path) -> Table:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.schema.mapping import MAGNITUDE, MODULO, TWOS, VECTOR
+from winchkit.schema.mapping import EULER, MAGNITUDE, MODULO, TWOS, VECTOR
 
 _FIELDS = (2.0**16, 2.0**24, 2.0**32)
 """Ranges of the fields of counters, whose numbers may be negative ones stored without a sign."""
@@ -47,7 +47,7 @@ def restored(values: Array, stored: str) -> Array:
     ``values`` (n,): NaN where missing. ``stored``: ``modulo 360``, ``two's complement 65536``,
     ``sign and magnitude 2048``; empty for numbers that are stored as they are.
     """
-    if stored in {"", VECTOR}:
+    if stored in {"", VECTOR, EULER}:
         return values
     kind, _, text = stored.rpartition(" ")
     modulus = float(text)

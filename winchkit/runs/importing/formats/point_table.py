@@ -1,0 +1,46 @@
+"""Tables of points without a header, as laser trackers export them: a name and three coordinates.
+
+    P001;903.3055;2062.6540;582.5511
+    A Poses P001 903.3055 2062.6540 582.5511
+
+The names are those of the point, of its group and of its collection (SpatialAnalyzer, *Exporting
+ASCII Formatted Points*); behind the coordinates stand texts, or what SpatialAnalyzer adds (offsets
+of the reflector, uncertainties, time stamps). The unit of the coordinates is asked where the lines
+above do not declare it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import takewhile
+
+from winchkit.runs.importing.table import Column, Table, named_apart
+
+_NAMES = ("Collection", "Group", "Point")
+"""Names before the coordinates; fewer are the last of them."""
+_COORDINATES = ("X", "Y", "Z")
+_PROGRAM = "spatialanalyzer"
+
+
+def with_coordinates(table: Table) -> Table:
+    """Names for the columns of a table of points that has none."""
+    columns = table.columns
+    if any(column.name != str(column.number) for column in columns):
+        return table
+    names = len(list(takewhile(_is_text, columns)))
+    behind = columns[names + len(_COORDINATES) :]
+    by_program = any(
+        _PROGRAM in text.casefold() for pair in table.metadata.items() for text in pair
+    )
+    if not 1 <= names <= len(_NAMES) or len(columns) < names + len(_COORDINATES):
+        return table
+    coordinates = columns[names : names + len(_COORDINATES)]
+    if any(map(_is_text, coordinates)) or not (by_program or all(map(_is_text, behind))):
+        return table
+    titles = (*_NAMES[-names:], *_COORDINATES)
+    titled = [replace(c, name=t) for c, t in zip(columns, titles, strict=False)]
+    return replace(table, columns=named_apart([*titled, *behind]))
+
+
+def _is_text(column: Column) -> bool:
+    return column.texts is not None
