@@ -62,12 +62,14 @@ def with_transitions(effect: Effect, transitions: Mapping[str, float]) -> Effect
     )
 
 
-def with_free_transition(effect: Effect) -> Effect:
-    """An effect whose transition is fitted, on a logarithmic scale."""
+def with_free_transition(effect: Effect, largest: float) -> Effect:
+    """An effect whose transition is fitted up to a largest one, on a logarithmic scale."""
     return replace(
         effect,
         parameters=tuple(
-            replace(p, role="nuisance", low=_LEAST * p.typical) if p.name == TRANSITION else p
+            replace(p, role="nuisance", low=min(_LEAST * p.typical, largest / 2), high=largest)
+            if p.name == TRANSITION
+            else p
             for p in effect.parameters
         ),
     )

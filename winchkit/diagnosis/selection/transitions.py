@@ -75,14 +75,15 @@ def _best(
         for size in sizes
     ]
     best = min(tried, key=lambda fitted: fitted.chi_square)
-    free = fit(regression, _freed(best.hypothesis, places[0]), inverse_sigma)
+    free = fit(regression, _freed(best.hypothesis, places[0], float(sizes[-1])), inverse_sigma)
     return free.hypothesis.terms[places[0]].values[TRANSITION]
 
 
-def _freed(hypothesis: Hypothesis, index: int) -> Hypothesis:
-    """The hypothesis with the transition of one term as an unknown."""
+def _freed(hypothesis: Hypothesis, index: int, largest: float) -> Hypothesis:
+    """The hypothesis with the transition of one term as an unknown up to a largest one."""
     term = hypothesis.terms[index]
-    return hypothesis.with_term_at(index, Term(with_free_transition(term.effect), term.values))
+    effect = with_free_transition(term.effect, largest)
+    return hypothesis.with_term_at(index, Term(effect, term.values))
 
 
 def _is_better(engine: TimeSeriesSelection, better: Fit, present: Fit, noise: Noise) -> bool:
@@ -101,12 +102,12 @@ def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: Nois
     Where it is at its lower bound the friction is sharp, and the given model is returned.
     """
     present = final
-    for unit in _highest_rates(engine):
+    for unit, rate in _highest_rates(engine).items():
         for index in _frictions(present.hypothesis, unit)[:1]:
             term = present.hypothesis.terms[index]
             if not term.values.get(TRANSITION) or Coordinates(term.effect).nuisances:
                 continue
-            free = engine.refit(_freed(present.hypothesis, index), noise)
+            free = engine.refit(_freed(present.hypothesis, index, _LARGEST * rate), noise)
             values = free.hypothesis.terms[index]
             if values.values[TRANSITION] > _SHARP * values.effect.parameter(TRANSITION).low:
                 present = free
