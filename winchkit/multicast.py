@@ -8,7 +8,7 @@ what was sent here is not received.
 from __future__ import annotations
 
 import ctypes
-import select
+import selectors
 import socket
 import struct
 import sys
@@ -69,9 +69,9 @@ class MulticastPort:
                 self._input.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP, member)
             if sys.platform == "linux":
                 self._input.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+            self._arrival = opened.enter_context(selectors.DefaultSelector())
+            self._arrival.register(self._input, selectors.EVENT_READ)
             self._opened = opened.pop_all()
-        self._arrival = select.poll()
-        self._arrival.register(self._input, select.POLLIN)
         self.arrived = 0.0
         """Arrival of the last frame by the kernel, s since the epoch; 0 where it does not say."""
 
@@ -98,9 +98,9 @@ class MulticastPort:
         Raises OSError, and ValueError for a datagram that is no frame.
         """
         try:
-            datagram, ancillary, _, sender = self._input.recvmsg(_LONGEST, _ANCILLARY)
+            datagram, ancillary, sender = self._taken()
         except BlockingIOError:
-            if timeout > 0 and self._arrival.poll(timeout * 1e3):
+            if timeout > 0 and self._arrival.select(timeout):
                 return self.receive(0.0)
             return None
         if sender[1] == self._own[1] and sender[:2] in (self._own, self._source()):
@@ -113,6 +113,14 @@ class MulticastPort:
             return None if other else (frame["arbitration_id"], bytes(frame["data"]))
         except (KeyError, TypeError) as error:
             raise ValueError(f"a datagram is no CAN frame: {error!r}") from error
+
+    def _taken(self) -> tuple[bytes, Sequence[tuple[int, int, bytes]], tuple[str, int]]:
+        """A datagram, its control messages and sender; raises OSError."""
+        if sys.platform == "win32":  # has no recvmsg
+            datagram, sender = self._input.recvfrom(_LONGEST)
+            return datagram, (), sender
+        datagram, ancillary, _, sender = self._input.recvmsg(_LONGEST, _ANCILLARY)
+        return datagram, ancillary, sender
 
     def _source(self) -> tuple[str, int]:
         """Address of this computer on the way to the group, and the port of what is sent here."""

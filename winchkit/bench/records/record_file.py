@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 import threading
 from contextlib import suppress
 
 _PAGE = 4096
 """Bytes: a record grows by whole pages, padded with spaces."""
-_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0)
+_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_CLOEXEC", "O_NONBLOCK", "O_BINARY"))
 
 
 class RecordFile:
@@ -67,10 +68,10 @@ class RecordFile:
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is None:
             return
+        os.close(descriptor)
         if remove:
             with suppress(OSError):
                 os.unlink(self.path)
-        os.close(descriptor)
 
     def _replace(self, text: str) -> None:
         self._create(text)
@@ -87,6 +88,8 @@ class RecordFile:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+        if sys.platform == "win32":
+            self.close()  # an open file cannot be replaced there
         os.replace(draft, self.path)
         _sync_folder(os.path.dirname(self.path) or ".")
 

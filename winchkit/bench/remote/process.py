@@ -64,21 +64,24 @@ def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
     """
     files = [os.path.abspath(file) for file in (spec.path, *effects)]
     command = [sys.executable, "-P", "-m", "winchkit.bench.remote.process", *files]
-    with (
-        log_path(spec).open("ab") as said,
-        subprocess.Popen(
+    with log_path(spec).open("ab") as said:
+        process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=said,
             start_new_session=True,
-        ) as process,
-    ):
-        assert process.stdout is not None, "it is a pipe"
-        line = process.stdout.readline()
+            # In place of a session on Windows: Ctrl-C of the client's terminal does not reach it.
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+        )
+    assert process.stdout is not None, "it is a pipe"
+    with process.stdout as replies:
+        line = replies.readline()
         while line and _PROGRESS in (reply := json.loads(line)):
             to_stderr(reply[_PROGRESS])
-            line = process.stdout.readline()
+            line = replies.readline()
+    if sys.platform != "win32":
+        process.wait()  # it has left the bench to a process of its own; on Windows it is the bench
     return _spawned(spec, line)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import sys
 from collections import defaultdict, deque
 from collections.abc import Awaitable, Sequence
 from functools import partial
@@ -25,6 +24,7 @@ from winchkit.drivers.modbus import transactions
 from winchkit.drivers.modbus.deviations import Deviations
 from winchkit.drivers.modbus.frames import AnswerGate, Event
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
+from winchkit.drivers.unplugged import UNPLUGGED
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.modbus import ReadBlock
@@ -49,12 +49,7 @@ _EXCEPTIONS = {
     11: "gateway target silent",
 }
 
-_PORT_ERRORS: tuple[type[Exception], ...] = (ModbusException, OSError, ValueError)
-if sys.platform != "win32":
-    import termios
-
-    # A port that was pulled out raises this from its settings, and it is no OSError.
-    _PORT_ERRORS += (termios.error,)
+_PORT_ERRORS = (ModbusException, ValueError, *UNPLUGGED)
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, event_of, thread_of
+from winchkit.drivers.unplugged import UNPLUGGED
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
@@ -100,7 +101,7 @@ class SerialPort:
         """Send bytes; raises ConnectionLost."""
         try:
             self._serial.write(data)
-        except (OSError, _termios_error()) as error:
+        except UNPLUGGED as error:
             raise ConnectionLost(f"{self.where}: cannot send: {error}") from error
 
     def close(self) -> None:
@@ -111,14 +112,12 @@ class SerialPort:
 
     def _receive(self) -> None:
         """Read until closed or unplugged; on the thread of this port."""
-        failures = (OSError, _termios_error())
         while not self._closing.is_set():
             try:
                 data = self._serial.read(1)
                 if data:
                     data += self._serial.read(self._serial.in_waiting)
-            except failures as error:
-                # An unplugged port raises a SerialException, a bare OSError or a termios.error.
+            except UNPLUGGED as error:
                 self._deliver(Chunk(b"", self._clock.now()), error)
                 return
             if data:
@@ -184,12 +183,3 @@ def set_latency(port: str, timers: Path = _LATENCY_TIMERS) -> tuple[float, str]:
     if latency <= _HOST_LATENCY:
         return latency, ""
     return latency, f"{timer} {advice}: bytes are handed over {latency * 1e3:g} ms late"
-
-
-def _termios_error() -> type[Exception]:
-    """``termios.error``, which is no OSError; nothing of the kind on Windows."""
-    try:
-        from termios import error
-    except ImportError:
-        return OSError
-    return error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import socket
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, Protocol
@@ -236,6 +237,11 @@ def _cause(spec: BusSpec, error: Exception) -> str:
         return f"{error}; a machine with only `lo` needs: ip route add 239.0.0.0/8 dev lo"
     if spec.interface == "socketcand" and (spec.host is None or spec.port is None):
         return "it needs `host` and `port` of the daemon, in a bench file"
+    if spec.interface == "socketcan" and sys.platform != "linux":
+        return (
+            "SocketCAN is part of Linux; here an adapter has an interface of its maker, such as "
+            "pcan, kvaser, ixxat, gs_usb or slcan"
+        )
     needed = _LIBRARIES.get(spec.interface or "")
     if needed is not None and _says_missing(error):
         return f"it needs {needed}"
