@@ -54,6 +54,18 @@ class Case:
     truth: dict[str, object] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Instruments:
+    """What all runs of a case have in common."""
+
+    colour: float
+    """Share of the noise's power that is coloured."""
+    zero: float
+    """Of the length counter, m."""
+    warm: bool
+    """Whether the temperature varies and is measured."""
+
+
 def kinds(seed: int, cases: int) -> list[str]:
     """Kind of each case: all alike often, in an order that follows from the seed."""
     even = [KINDS[index % len(KINDS)] for index in range(cases)]
@@ -72,11 +84,12 @@ def draw_case(seed: int, index: int, kind: str) -> Case:
         ideal.append(motion(programmes[number], mass, _temperature(random, warm), number))
     last = motion(programmes[2], masses[-1], _temperature(random, warm), 2)
     hidden, snr = draw_hidden(random, kind, machine, ideal, warm)
-    colour = float(random.choice([0.0, 0.0, 0.3]))
-    zero = float(random.normal(0, 0.02))
+    instruments = Instruments(
+        float(random.choice([0.0, 0.0, 0.3])), float(random.normal(0, 0.02)), warm
+    )
 
     def recorded(run: Motion) -> Table:
-        return record(random, machine, run, hidden, colour, zero, warm)
+        return record(random, machine, run, hidden, instruments)
 
     runs = [run for run in ideal for _ in range(1 if kind == "once" else 2)]
     tables = [recorded(run) for run in runs]
@@ -161,19 +174,17 @@ def record(
     machine: Machine,
     run: Motion,
     hidden: tuple[Hidden, ...],
-    colour: float,
-    zero: float,
-    warm: bool,
+    instruments: Instruments,
 ) -> Table:
     """Samples of a run by perfect loggers, and what the declared machine would show there."""
     ideal, nominal = outputs(machine, run, hidden), outputs(machine, run)
     table = {"time": run.time[::EVERY], "motor_angle": run.angle[::EVERY]}
     count = len(table["time"])
     for name in machine.outputs:
-        noise = instrument_noise(random, count, machine.noise[name], colour)
-        offset = zero if name == "cable_length" else 0.0
+        noise = instrument_noise(random, count, machine.noise[name], instruments.colour)
+        offset = instruments.zero if name == "cable_length" else 0.0
         table[name] = ideal[name][::EVERY] + noise + offset
-    if warm:
+    if instruments.warm:
         table["temperature"] = run.temperature[::EVERY] + random.normal(0, 0.02, count)
     return table | {f"nominal_{name}": x[::EVERY] for name, x in nominal.items()}
 

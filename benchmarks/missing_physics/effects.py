@@ -77,8 +77,8 @@ class Effect:
     size: float | None = None
     """Usual one, SI; without it the noise of the torque, and no bound."""
     where: str = "both"
-    """``winch``, ``axis``, ``both``; ``gear``, ``layers``, ``warm``: winches that have it; ``slow``:
-    the samples resolve an order of the motor angle."""
+    """``winch``, ``axis``, ``both``; ``gear``, ``layers``, ``warm``: winches that have it;
+    ``slow``: the samples resolve an order of the motor angle."""
     drawn: Callable[[Random, Motion], Parameters] = lambda _random, _motion: {}
     """Its other parameters."""
     names: tuple[str, ...] = ()

@@ -42,15 +42,15 @@ def main(arguments: list[str] | None = None) -> int:
     scoring.add_argument("--json", action="store_true", help="every case, as JSON")
     args = parser.parse_args(arguments)
     truths = args.truths or args.folder / "truths"
+    if args.command == "write":
+        if (args.folder / "cases").exists():
+            parser.error(f"{args.folder / 'cases'} exists; name another folder")
+        write(args.folder, truths, args.seed, args.cases, args.of)
+        return 0
+    entrants = sorted(path for path in args.folder.glob("answers/*") if path.is_dir())
+    if not entrants:
+        parser.error(f"{args.folder / 'answers'}: no folder of an entrant there; README.md")
     try:
-        if args.command == "write":
-            if (args.folder / "cases").exists():
-                raise AnswerError(f"{args.folder / 'cases'} exists; name another folder")
-            write(args.folder, truths, args.seed, args.cases, args.of)
-            return 0
-        entrants = sorted(path for path in args.folder.glob("answers/*") if path.is_dir())
-        if not entrants:
-            raise AnswerError(f"{args.folder / 'answers'}: no folder of an entrant there")
         judged = {path.name: score(truths, path) for path in entrants}
     except AnswerError as error:
         print(error, file=sys.stderr)

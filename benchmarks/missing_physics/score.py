@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-VERDICTS = ("effects", "none", "unknown")
+VERDICTS = ("effects", "none", "unknown", "no answer")
 WORDS = (
     "right",
     "in a set",
@@ -64,21 +64,18 @@ def judge(answer: Answer, truth: Mapping[str, Any]) -> str:
     """One of ``WORDS``."""
     right = [set(names) for names in truth["right"]]
     known = set(truth["tolerated"]).union(*right)
-    found = [any(names & named for named, _ in answer.effects) for names in right]
+    if answer.verdict == "no answer":
+        return answer.verdict
     if any(certain and not names & known for names, certain in answer.effects):
         return "wrong and certain"
-    if truth["outside"]:
-        return "rightly unknown" if answer.verdict == "unknown" else "missed"
     if not right:
-        # A doubtful name where nothing is hidden is no certain one, and not "none" either.
-        return "rightly none" if answer.verdict == "none" else "missed"
-    if not any(found):
-        return "missed"
-    if not all(found):
-        return "in part"
-    alone = [
-        any(certain and named <= names for named, certain in answer.effects) for names in right
-    ]
+        # A doubtful name where nothing has a name is neither certain nor "none".
+        expected = "unknown" if truth["outside"] else "none"
+        return f"rightly {expected}" if answer.verdict == expected else "missed"
+    found = sum(any(names & named for named, _ in answer.effects) for names in right)
+    if found < len(right):
+        return "in part" if found else "missed"
+    alone = [any(sure and named <= names for named, sure in answer.effects) for names in right]
     return "right" if all(alone) else "in a set"
 
 
@@ -105,6 +102,12 @@ class Judged:
     case: str
     kind: str
     word: str
+    hidden: int
+    """Effects with a name that are hidden."""
+    found: int
+    """Those of them that are named, alone or in a set, certain or not."""
+    wrong: int
+    """Names, alone or in a set, that no hidden effect bears."""
     before: float
     """Error of the declared machine on the held-out run over the noise."""
     after: float
@@ -121,16 +124,26 @@ def score(truths: Path, answers: Path) -> list[Judged]:
     for path in found:
         truth = json.loads(path.read_text(encoding="utf-8"))
         before, given = held_out_error({}, truth), answers / path.name
-        if not given.is_file():
-            out.append(Judged(path.stem, truth["kind"], "no answer", before, before, 0.0))
-            continue
-        answer = read_answer(given)
+        answer = read_answer(given) if given.is_file() else Answer("no answer", (), {})
         try:
             after = held_out_error(answer.predicted, truth)
         except AnswerError as error:
             raise AnswerError(f"{given}: {error}") from error
-        word = judge(answer, truth)
-        out.append(Judged(path.stem, truth["kind"], word, before, after, answer.seconds))
+        right, tolerated = [set(names) for names in truth["right"]], set(truth["tolerated"])
+        named = [names for names, _ in answer.effects]
+        out.append(
+            Judged(
+                case=path.stem,
+                kind=truth["kind"],
+                word=judge(answer, truth),
+                hidden=len(right),
+                found=sum(any(names & one for one in named) for names in right),
+                wrong=sum(not one & tolerated.union(*right) for one in named),
+                before=before,
+                after=after,
+                seconds=answer.seconds,
+            )
+        )
     return out
 
 
@@ -143,6 +156,8 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
         return {
             "cases": len(some),
             **{word: counts[word] for word in WORDS},
+            "found": f"{sum(one.found for one in some)} of {sum(one.hidden for one in some)}",
+            "wrong names": sum(one.wrong for one in some),
             "before": float(np.median([one.before for one in some])),
             "after": float(np.median(after)),
             "after, 90 %": float(np.quantile(after, 0.9)),
@@ -157,7 +172,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
 
 def table(found: Mapping[str, Mapping[str, Any]]) -> str:
     """One line for each entrant, as Markdown."""
-    columns = [*WORDS, "after", "after, 90 %", "seconds"]
+    columns = [*WORDS, "found", "wrong names", "before", "after", "after, 90 %", "seconds"]
     lines = ["| entrant | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for entrant, figures in found.items():
         cells = [
