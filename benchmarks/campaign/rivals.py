@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,15 @@ from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.signatures import Signatures, signatures
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.effect import MOTOR_ORDERS
+from winchkit.effects.term import Term
 
 _LEVEL = 0.05
 _MOST = 15
 _FOLDS = 5
 _MOST_ROWS = 10_000
 _THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
+ALPHA = 1e-3
+"""Ridge of STLSQ."""
 _NOTHING = 1e-12
 _PRESENT = 1e-6
 
@@ -46,6 +49,10 @@ class Regression:
     """Columns that stand or fall together."""
     fold: NDArray[np.intp]
     """Block of time of every row."""
+    terms: tuple[Term, ...] = ()
+    """Usual-size step of every column."""
+    steps: Array = field(default_factory=lambda: np.ones(0))
+    """(p,), usual-size steps per unit coefficient."""
 
 
 def regression_of(engine: TimeSeriesSelection) -> Regression:
@@ -53,10 +60,8 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     regression = engine.regression
     # Each output by its own size: metres and newtons on one scale.
     known = regression.nuisance_columns
-    left = (
-        regression.nominal_residual
-        - known @ np.linalg.lstsq(known, regression.nominal_residual, rcond=None)[0]
-    )
+    residual = regression.residual(engine.initial_model)
+    left = residual - known @ np.linalg.lstsq(known, residual, rcond=None)[0]
     size = np.empty(regression.n_rows)
     for output in regression.dataset.outputs:
         own = [s for s in regression.segments if s.output == output]
@@ -65,10 +70,7 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
         for segment in own:
             size[segment.rows] = np.sqrt(total / count) or 1.0
     tried = all_columns(engine)
-    rows = np.column_stack(
-        [regression.nominal_residual, regression.nuisance_columns, tried.columns]
-    )
-    rows = rows / size[:, None]
+    rows = np.column_stack([residual, known, tried.columns]) / size[:, None]
     every = max(1, regression.n_rows // _MOST_ROWS)
     times, folds = [], []
     for segment in regression.segments:
@@ -83,15 +85,21 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     whole = whole - basis @ (basis.T @ whole)
     columns = whole[:, 1 + nuisances :]
     length = np.sqrt(np.sum(columns**2, axis=0))
-    columns = columns / np.maximum(length, _NOTHING)
-    atoms = tried.candidates
-    effects = [""] * columns.shape[1]
-    for atom in atoms:
-        for index in range(atom.columns.start, atom.columns.stop):
-            effects[index] = atom.effect.id
-    residual = whole[:, 0] / max(float(np.std(whole[:, 0])), _NOTHING)
+    length = np.maximum(length, _NOTHING)
+    terms = [
+        Term(atom.effect, {**atom.effect.null, **atom.shape, **step})
+        for atom in tried.candidates
+        for step in atom.usual_steps
+    ]
+    unit = max(float(np.std(whole[:, 0])), _NOTHING)
     return Regression(
-        residual, columns, tuple(effects), tuple(a.columns for a in atoms), np.concatenate(folds)
+        residual=whole[:, 0] / unit,
+        columns=columns / length,
+        effects=tuple(term.effect.id for term in terms),
+        atoms=tuple(atom.columns for atom in tried.candidates),
+        fold=np.concatenate(folds),
+        terms=tuple(terms),
+        steps=unit / length,
     )
 
 
@@ -151,29 +159,34 @@ def lasso(data: Regression) -> list[int]:
 
 def stlsq(data: Regression) -> list[int]:
     """Sequentially thresholded least squares, its threshold chosen on blocks of time."""
-    from pysindy.optimizers import STLSQ
+    return _present(_coefficients(data, threshold_of(data), np.ones(len(data.fold), dtype=bool)))
 
-    scale = np.sqrt(len(data.residual))
-    columns, target = data.columns * scale, data.residual[:, None]
 
-    def coefficients(threshold: float, kept: NDArray[np.bool_]) -> Array:
-        with warnings.catch_warnings():
-            # It warns where every term falls below the threshold: then it names none.
-            warnings.simplefilter("ignore")
-            model = STLSQ(threshold=threshold, alpha=1e-3)
-            model.fit(columns[kept], target[kept])
-        return np.asarray(model.coef_)[0]
+def threshold_of(data: Regression) -> float:
+    """Threshold of STLSQ with the least error on blocks of time."""
 
     def missed(threshold: float) -> float:
         total = 0.0
         for k in range(_FOLDS):
             test = data.fold == k
-            left = data.residual[test] - columns[test] @ coefficients(threshold, ~test)
+            scaled = data.columns[test] * np.sqrt(len(data.residual))
+            left = data.residual[test] - scaled @ _coefficients(data, threshold, ~test)
             total += float(left @ left)
         return total
 
-    best = min(_THRESHOLDS, key=missed)
-    return _present(coefficients(best, np.ones(len(target), dtype=bool)))
+    return min(_THRESHOLDS, key=missed)
+
+
+def _coefficients(data: Regression, threshold: float, kept: NDArray[np.bool_]) -> Array:
+    """STLSQ's coefficients of columns of unit rms, from some rows."""
+    from pysindy.optimizers import STLSQ
+
+    with warnings.catch_warnings():
+        # It warns where every term falls below the threshold: then it names none.
+        warnings.simplefilter("ignore")
+        model = STLSQ(threshold=threshold, alpha=ALPHA)
+        model.fit(data.columns[kept] * np.sqrt(len(data.residual)), data.residual[kept, None])
+    return np.asarray(model.coef_)[0]
 
 
 SELECTIONS: dict[str, Callable[[Regression], list[int]]] = {
@@ -183,14 +196,6 @@ SELECTIONS: dict[str, Callable[[Regression], list[int]]] = {
     "pysindy STLSQ": stlsq,
 }
 """Columns that each method selects, in the order of its choice."""
-
-
-def _names(select: Callable[[Regression], list[int]]) -> Callable[[Regression], tuple[str, ...]]:
-    """Effects of the selected columns."""
-    return lambda data: tuple(dict.fromkeys(data.effects[i] for i in select(data)))
-
-
-RIVALS = {name: _names(select) for name, select in SELECTIONS.items()}
 
 
 def _forward(data: Regression, enough: Callable[[float, float, int], bool]) -> list[int]:
