@@ -12,6 +12,7 @@ from winchkit.schema.quantity import (
     Angle,
     Length,
     PositiveAcceleration,
+    PositiveDuration,
     PositiveForce,
     PositiveLength,
     PositiveSpeed,
@@ -32,6 +33,8 @@ class TrackerWiring(Table):
     """Address at which this computer receives them, ``udp://HOST:PORT``."""
     frame: str = "tracker"
     """Name of the frame in which the poses are given."""
+    max_age: PositiveDuration = 0.1
+    """Age of the newest pose at which a pose that is held by it trips the bench, s."""
 
     def rules(self) -> Iterator[Rule]:
         """The address has a host and a port."""

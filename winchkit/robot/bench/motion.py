@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Target
-from winchkit.robot.bench.tension_trim import CableTrim
+from winchkit.robot.bench.correction import CableCorrection
 from winchkit.robot.bench.trajectory import PlatformTrajectory
 
 _SHORTEST_STOP = 0.1
@@ -80,7 +80,7 @@ class CableMotion:
         cable: CableMap,
         *,
         holds: bool,
-        trim: CableTrim | None = None,
+        trim: CableCorrection | None = None,
     ) -> None:
         """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s).
 
@@ -147,13 +147,13 @@ class CableRunDown:
     def duration(self) -> float:
         """s."""
         trim = self._motion.trim
-        return max(self._motion.clock.stop_time, 0.0 if trim is None else trim.trim.duration)
+        return max(self._motion.clock.stop_time, 0.0 if trim is None else trim.correction.duration)
 
     def start(self, _time: float, _angle: float, _winding_speed: float) -> None:
         """Order the stop for all winches of the robot."""
         self._motion.clock.slow_down()
         if self._motion.trim is not None:
-            self._motion.trim.trim.end()
+            self._motion.trim.correction.end()
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """As along the motion, until it rests."""

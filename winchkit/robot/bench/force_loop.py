@@ -1,0 +1,138 @@
+"""Control of the cable forces of a platform that balance each other, by its load cells.
+
+Set-point f_s and readings f: the deviation P (f_s − f), with the projection P on the null space of
+the structure matrix, is corrected by winding speeds in proportion to the force and inverse to the
+stiffness k of each cable. The platform then keeps its pose, as far as the ratios of the stiffnesses
+are right. A cable under load integrates its speed: the loop needs no integrator.
+
+A change of the set-point is fed forward where the stiffnesses are known: the cables are wound by
+P Δf / k on an S-curve of one duration for all, and the loop compares the readings with the
+set-point that this ramp had when they were taken.
+
+The rest of the deviation, (1 − P)(f_s − f), is what the readings and the weight contradict each
+other by, whatever the preload is: a cell that jumps or stands still shows there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.control.tension_control import LOOP
+from winchkit.model.trajectory import Trajectory, plan
+from winchkit.robot.bench.correction import Latch
+
+UNBALANCED = 0.2
+"""Share of the mean cable force by which the readings may miss the balance with the weight:
+friction of three pulleys, and a payload that is not declared, stay below (rule of thumb)."""
+_UNBALANCED_TIME = 0.1
+"""A swinging platform unbalances its cables for less, s."""
+_FEED = 0.8
+"""Share of speed and acceleration for the change of the set-point; the loop has the rest."""
+_RISE = 0.05
+"""Time in which the acceleration of that change builds up, s: the lag of a drive."""
+
+
+@dataclass(frozen=True)
+class ForceSetting:
+    """Control of the forces of n cables, SI."""
+
+    names: Sequence[str]
+    force: Array
+    """Wanted cable forces, (n,), N."""
+    balanced: Array
+    """Projection on the forces that balance each other, (n, n)."""
+    stiffness: Array
+    """Of the cables, (n,), N/m; upper bounds where they are not known."""
+    known: bool
+    """Whether the stiffnesses are known: changes are fed forward then."""
+    delay: float
+    """Longest of reading and drive together, s."""
+    lag: float
+    """Usual one, s."""
+    speed: float
+    """m/s."""
+    acceleration: float
+    """m/s^2."""
+
+
+class ForceLoop:
+    """Winding speeds by the cable forces; a loop of a correction."""
+
+    def __init__(
+        self, setting: ForceSetting, readings: Callable[[float], Array], latch: Latch
+    ) -> None:
+        """Take ``readings`` of the forces at a time (s), (n,), NaN without a valid one."""
+        self.setting = setting
+        self.force = setting.force
+        """Set-point, (n,), N."""
+        self._readings, self._latch = readings, latch
+        self._aimed: Array | None = None
+        self._change = np.zeros_like(setting.force)
+        self._ramp: Trajectory | None = None
+        self._begun = 0.0
+        self._error = self._change
+        self._unbalanced_since = float("inf")
+
+    def aim(self, force: Array) -> None:
+        """Take another set-point, (n,), N, from the next cycle on; from any thread."""
+        self.force = force
+
+    def left(self, index: int) -> str:
+        """Force that is missing in a cable."""
+        return f"{self._error[index]:+.1f} N"
+
+    def speeds(self, time: float, now: float, _wound: Array) -> Array | None:
+        """Winding speeds (n,), m/s; None without all readings."""
+        shown = self._readings(now)
+        if not np.isfinite(shown).all():
+            return None
+        setting, force = self.setting, self.force
+        if force is not self._aimed:
+            self._begin(time, force, shown)
+        missing = force - shown
+        balanced = setting.balanced @ missing
+        self._watch(now, missing - balanced, force)
+        self._error = balanced - self._change * (1.0 - self._share(time - setting.lag)[0])
+        feed = self._change * self._share(time)[1]
+        return np.asarray((feed + LOOP / setting.delay * self._error) / setting.stiffness)
+
+    def _begin(self, time: float, force: Array, shown: Array) -> None:
+        """Plan the change from the forces of now."""
+        setting = self.setting
+        before = shown if self._aimed is None else self._aimed
+        rest = self._change * (1.0 - self._share(time)[0])
+        self._aimed, self._begun = force, time
+        if not setting.known:
+            return
+        self._change = setting.balanced @ (force - before) + rest
+        way = float(np.abs(self._change / setting.stiffness).max())
+        if way > 0.0:
+            acceleration = _FEED * setting.acceleration
+            self._ramp = plan(way, _FEED * setting.speed, acceleration, acceleration / _RISE)
+
+    def _share(self, time: float) -> tuple[float, float]:
+        """Share of the change that is made at a time (s), and its rate, 1/s."""
+        if self._ramp is None:
+            return 1.0, 0.0
+        way, speed, _ = self._ramp.at(max(0.0, time - self._begun))
+        return float(way) / self._ramp.distance, float(speed) / self._ramp.distance
+
+    def _watch(self, now: float, unbalanced: Array, force: Array) -> None:
+        """Trip where the readings contradict the weight."""
+        worst, limit = int(np.argmax(np.abs(unbalanced))), UNBALANCED * float(force.mean())
+        over = abs(unbalanced[worst]) > limit
+        self._unbalanced_since = min(self._unbalanced_since, now) if over else float("inf")
+        if now - self._unbalanced_since >= _UNBALANCED_TIME:
+            name = self.setting.names[worst]
+            words = (
+                f"the load cells and the weight contradict each other by {-unbalanced[worst]:+.0f} "
+                f"N in cable {name} (limit {limit:.0f} N for {_UNBALANCED_TIME:g} s); look for a "
+                "wrong load cell, a load that is not declared and a cable that touches something, "
+                "then reset"
+            )
+            self._latch(Trip("cable forces", name, words, latches=True))
