@@ -160,7 +160,7 @@ def recorded(sim: SimBench, profile: Path, seed: int, folder: Path) -> Path:
         with open_bench(spec, clock) as bench:
             tracker = Tracker(clock.now)
             live.robot.on_pose = tracker.receive
-            bench._tracker = tracker
+            bench.take_tracker(tracker)
             clock.sleep(0.5)
             return _logged(bench, random, folder / "path.csv")
 

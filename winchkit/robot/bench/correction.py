@@ -17,12 +17,15 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import GAIN, Target
+from winchkit.bench.control.motion import Target
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.tension_control import UsedUp, fastest_within
 from winchkit.schema.bench import LimitSpec
 
 Latch = Callable[[Trip], None]
+_GAIN = 4.0
+"""Of the position loop around a speed-controlled drive, 1/s: half of that of a move, since a wrong
+lag of the drive is position error there."""
 
 
 class Loop(Protocol):
@@ -73,6 +76,8 @@ class Correction:
         """Cable wound in since the start by the motors, (n,), m."""
         self._bounds, self._lasts, self._latch = bounds, lasts, latch
         self._acceleration = min(one.acceleration for one in bounds.limits)
+        self.lag = max(one.response_time for one in bounds.limits) / 2
+        """Usual lag of a drive behind its speed, s."""
         self._speed, self._travelled = np.zeros(count), np.zeros(count)
         self._joined: set[int] = set()
         self._cycle = self._begun = math.nan
@@ -159,16 +164,25 @@ class CableCorrection:
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at rest at a motor angle (rad)."""
         self._begin, self._slope = angle, 1.0 / self._cable.at(angle)[1]
+        self.join(time)
+
+    def join(self, time: float) -> None:
+        """Begin, where a motion of the platform has the angle."""
         self.correction.join(self._index)
         self.correction.at(self._index, time, time)
+
+    def at(self, time: float, now: float) -> tuple[float, float]:
+        """Cable wound in since the start (m) and winding speed (m/s)."""
+        return self.correction.at(self._index, time, now)
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """Where the correction is at this time."""
         correction = self.correction
-        wound, speed = correction.at(self._index, time, now)
+        wound, speed = self.at(time, now)
         correction.measured[self._index] = (angle - self._begin) / self._slope
         planned, velocity = self._begin + wound * self._slope, speed * self._slope
-        return Target(velocity + GAIN * (planned - angle), planned, speed, done=correction.ended)
+        late = planned - velocity * correction.lag - angle
+        return Target(velocity + _GAIN * late, planned, speed, done=correction.ended)
 
     def run_down(self) -> CorrectionRunDown:
         """The stop of all cables in common."""

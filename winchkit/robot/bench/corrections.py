@@ -14,14 +14,21 @@ from winchkit.bench.tracker import Tracker
 from winchkit.bench.winch import Winch
 from winchkit.errors import NotPermitted
 from winchkit.robot.bench.correction import Bounds, Correction, Loop
-from winchkit.robot.bench.force_loop import UNBALANCED, ForceLoop, ForceSetting
+from winchkit.robot.bench.force_loop import UNBALANCED, ForceLoop, ForceSetting, PathForces
+from winchkit.robot.bench.path_time import PathTime
 from winchkit.robot.bench.pose_loop import PoseLoop, TrackerLimits, TrackerWatch
+from winchkit.robot.bench.trajectory import PlatformTrajectory
 from winchkit.robot.forces.force_distribution import null_space
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.profiles.instruments import UNKNOWN
 from winchkit.schema.robot_bench import RobotWiring
 
+TRAVEL = 0.01
+"""Of each cable in a correction, m: half of the difference of the lengths above which they fit no
+pose."""
+_ALONG_SPEED, _ALONG_END = 0.02, 1.0
+"""Of each cable in a correction during a motion, m/s, and its time after the end, s."""
 _PROBE = 1.0
 """Force by which the elasticity of a cable is tried in the profile, N."""
 
@@ -51,9 +58,16 @@ class Corrections:
         return np.asarray(null @ null.T)
 
     def force_loop(
-        self, pose: Pose, force: Array, angles: Array, speed: float, axial_stiffness: float | None
+        self,
+        pose: Pose,
+        force: Array,
+        angles: Array,
+        speed: float,
+        *,
+        axial_stiffness: float | None = None,
+        path: PathForces | None = None,
     ) -> ForceLoop:
-        """The control of the forces (n,) at a pose, at motor angles (n,).
+        """The control of the forces (n,) at a pose, at motor angles (n,), or along a ``path``.
 
         Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
         """
@@ -83,7 +97,18 @@ class Corrections:
             speed,
             min(winch.wiring.limits.acceleration for winch in self.winches),
         )
-        return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch)
+        return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
+
+    def along(self, planned: PlatformTrajectory, angles: Array, clock: PathTime) -> Correction:
+        """The control of the forces during a motion that begins at motor angles (n,)."""
+        structure = self.robot.structure(planned.pose)
+        balanced = np.array([null @ null.T for null in map(null_space, structure)])
+        feeds = not self._elongation(angles, planned.force[0]).any()
+        path = PathForces(clock, float(planned.time[1]), planned.force, balanced, feeds)
+        start = Pose(planned.pose.position[:1], planned.pose.rotation[:1])
+        loop = self.force_loop(start, planned.force[0], angles, _ALONG_SPEED, path=path)
+        lasts = clock.duration + _ALONG_END
+        return self.correction([loop], TRAVEL, _ALONG_SPEED, lambda elapsed, _: elapsed < lasts)
 
     def require_balance(self, pose: Pose, force: Array) -> None:
         """Raise NotPermitted where a cell has no reading, or they contradict the weight."""
@@ -172,16 +197,21 @@ class Corrections:
 
         The declared one, else that of the effects of the profile, else a bound by the profile.
         """
-        robot = self.robot
+        robot, declared = self.robot, axial_stiffness or self.wiring.axial_stiffness
         length = robot.lengths(pose)[0]
-        if axial_stiffness is not None:
-            return axial_stiffness / (length + robot.dead_length), True
-        softer = robot.lengths_at(angles, force + _PROBE) - robot.lengths_at(angles, force)
+        if declared is not None:
+            return declared / (length + robot.dead_length), True
+        softer = self._elongation(angles, force)
         if np.all(softer > 0):
-            return _PROBE / softer[0], True
+            return 1.0 / softer, True
         cables = [line.profile.cable for line in robot.lines]
         bounds = zip(cables, length.tolist(), strict=True)
         return np.array([greatest_stiffness(one, there, None) for one, there in bounds]), False
+
+    def _elongation(self, angles: Array, force: Array) -> Array:
+        """Elongation of each cable per force by the effects of the profile, (n,), m/N."""
+        there, more = (self.robot.lengths_at(angles, one) for one in (force, force + _PROBE))
+        return np.asarray((more - there)[0] / _PROBE)
 
     def _require_torque(self, force: Array, angles: Array) -> None:
         """Raise NotPermitted where a drive's torque does not hold a cable force (n,)."""

@@ -25,6 +25,7 @@ from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.tension_control import LOOP
 from winchkit.model.trajectory import Trajectory, plan
 from winchkit.robot.bench.correction import Latch
+from winchkit.robot.bench.path_time import PathTime
 
 UNBALANCED = 0.2
 """Share of the mean cable force by which the readings may miss the balance with the weight:
@@ -60,22 +61,61 @@ class ForceSetting:
     """m/s^2."""
 
 
+@dataclass(frozen=True)
+class PathForces:
+    """Planned cable forces along a motion, at k equal steps of time."""
+
+    clock: PathTime
+    step: float
+    """s."""
+    force: Array
+    """(k, n), N."""
+    balanced: Array
+    """Projections on the forces that balance each other, (k, n, n)."""
+    feeds: bool
+    """Whether their elongation is to be fed forward: the motor angles of the plan have none."""
+
+    def at(self, late: float) -> tuple[Array, Array]:
+        """Force and projection ``late`` s before the present time along the motion."""
+        index = self._index(late)
+        return self.force[index], self.balanced[index]
+
+    @property
+    def rate(self) -> Array:
+        """Rate of the forces, (n,), N/s."""
+        first = min(self._index(0.0), len(self.force) - 2)
+        change = (self.force[first + 1] - self.force[first]) / self.step
+        return np.asarray(change * (0.0 if self.clock.ended else self.clock.rate))
+
+    def _index(self, late: float) -> int:
+        index = int((self.clock.now - late * self.clock.rate) / self.step)
+        return max(0, min(index, len(self.force) - 1))
+
+
 class ForceLoop:
     """Winding speeds by the cable forces; a loop of a correction."""
 
     def __init__(
-        self, setting: ForceSetting, readings: Callable[[float], Array], latch: Latch
+        self,
+        setting: ForceSetting,
+        readings: Callable[[float], Array],
+        latch: Latch,
+        path: PathForces | None = None,
     ) -> None:
-        """Take ``readings`` of the forces at a time (s), (n,), NaN without a valid one."""
+        """Take ``readings`` of the forces at a time (s), (n,), NaN without a valid one.
+
+        With a ``path`` the set-point is the planned one of the present place.
+        """
         self.setting = setting
         self.force = setting.force
         """Set-point, (n,), N."""
-        self._readings, self._latch = readings, latch
+        self._readings, self._latch, self._path = readings, latch, path
         self._aimed: Array | None = None
         self._change = np.zeros_like(setting.force)
         self._ramp: Trajectory | None = None
         self._begun = 0.0
-        self._error = self._change
+        self.error = self._change
+        """Forces that balance each other and are missing, (n,), N."""
         self._unbalanced_since = float("inf")
 
     def aim(self, force: Array) -> None:
@@ -84,22 +124,26 @@ class ForceLoop:
 
     def left(self, index: int) -> str:
         """Force that is missing in a cable."""
-        return f"{self._error[index]:+.1f} N"
+        return f"{self.error[index]:+.1f} N"
 
     def speeds(self, time: float, now: float, _wound: Array) -> Array | None:
         """Winding speeds (n,), m/s; None without all readings."""
         shown = self._readings(now)
         if not np.isfinite(shown).all():
             return None
-        setting, force = self.setting, self.force
-        if force is not self._aimed:
+        setting, force, projection = self.setting, self.force, self.setting.balanced
+        if self._path is not None:
+            force, projection = self._path.at(setting.lag)
+        elif force is not self._aimed:
             self._begin(time, force, shown)
         missing = force - shown
-        balanced = setting.balanced @ missing
+        balanced = projection @ missing
         self._watch(now, missing - balanced, force)
-        self._error = balanced - self._change * (1.0 - self._share(time - setting.lag)[0])
+        self.error = balanced - self._change * (1.0 - self._share(time - setting.lag)[0])
         feed = self._change * self._share(time)[1]
-        return np.asarray((feed + LOOP / setting.delay * self._error) / setting.stiffness)
+        if self._path is not None and self._path.feeds and setting.known:
+            feed = self._path.rate
+        return np.asarray((feed + LOOP / setting.delay * self.error) / setting.stiffness)
 
     def _begin(self, time: float, force: Array, shown: Array) -> None:
         """Plan the change from the forces of now."""

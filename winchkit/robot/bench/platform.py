@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import scipy.optimize  # loaded with the robot: in motion an import delays the loop
 import scipy.spatial.transform  # noqa: F401
@@ -13,16 +11,14 @@ from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.bench.control.snapshot import Direction
 from winchkit.robot.bench.correction import CableCorrection
-from winchkit.robot.bench.motion import CableMotion, PathTime
+from winchkit.robot.bench.motion import CableMotion
 from winchkit.robot.bench.path import Waypoint
+from winchkit.robot.bench.path_time import PathTime
 from winchkit.robot.bench.platform_correction import HeldPlatform
 from winchkit.robot.bench.platform_pose import require_finite
 from winchkit.robot.bench.quick_stop import quick_stop_ramps
 from winchkit.robot.bench.trajectory import PlatformTrajectory
 from winchkit.robot.geometry.kinematics import Pose
-
-if TYPE_CHECKING:
-    pass
 
 
 class Platform(HeldPlatform):
@@ -102,7 +98,7 @@ class Platform(HeldPlatform):
         require_finite("preload", preload)
         present = self._angles()[0] - planned.motor_angle[0]
         kept: Array = present
-        if preload is not None and not self.planner.wiring.tension_trim:
+        if preload is not None and self.planner.wiring.tension_trim == "none":
             kept = preload
         share = planned.distance[:, None] / planned.path.length
         angles = planned.motor_angle + present + share * (kept - present)
@@ -111,8 +107,12 @@ class Platform(HeldPlatform):
         curve = CubicSpline(planned.time, angles, bc_type="clamped")
         clock = PathTime(planned, self.planner.wiring.acceleration)
         step = float(planned.time[1])
+        mode = self.planner.wiring.tension_trim
         trims: list[CableCorrection] | list[None] = [None] * len(self._winches)
-        if self.planner.wiring.tension_trim:
+        if mode == "along":
+            common = self.corrections.along(planned, self._angles()[0], clock)
+            trims = [CableCorrection(common, i, one.cable) for i, one in enumerate(self._winches)]
+        elif mode == "end":
             trims = self._trims(
                 Pose(planned.pose.position[-1:], planned.pose.rotation[-1:]),
                 planned.force[-1],
@@ -120,7 +120,15 @@ class Platform(HeldPlatform):
             )
         self._start(
             [
-                CableMotion(clock, curve.c[:, :, i], step, winch.cable, holds=hold, trim=trim)
+                CableMotion(
+                    clock,
+                    curve.c[:, :, i],
+                    step,
+                    winch.cable,
+                    holds=hold,
+                    trim=trim,
+                    along=mode == "along",
+                )
                 for i, (winch, trim) in enumerate(zip(self._winches, trims, strict=True))
             ]
         )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,8 +14,9 @@ from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.host import WinchHost
 from winchkit.bench.winch import LONGEST_HOLD
 from winchkit.errors import MotionError, NotPermitted, UsageError
+from winchkit.plain_json import finite_or_none
 from winchkit.robot.bench.correction import CableCorrection, HeldCorrection
-from winchkit.robot.bench.corrections import Corrections
+from winchkit.robot.bench.corrections import TRAVEL, Corrections
 from winchkit.robot.bench.force_loop import ForceLoop
 from winchkit.robot.bench.platform_pose import PlatformPose, require_finite
 from winchkit.robot.bench.pose_loop import PoseLoop
@@ -28,9 +28,6 @@ from winchkit.schema.robot_bench import RobotWiring
 if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
 
-_TRAVEL = 0.01
-"""Of each cable in a correction, m: half of the difference of the lengths above which they fit no
-pose."""
 _TRIM_SPEED, _TRIM_TIME = 0.005, 5.0
 """m/s and s."""
 _HOLD_SPEED = 0.05
@@ -42,18 +39,6 @@ _NO_FORCES = (
     "change the limits"
 )
 Preload = float | Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Held:
-    """What a platform holds, and how far it is from it."""
-
-    force: Array | None
-    """Set-point of the cable forces, (n,), N."""
-    measured: Array
-    """By the cells, (n,), N; NaN without a valid reading."""
-    pose_error: Array | None
-    """Position (m) and rotation vector (rad) from the goal by the tracker, (6,)."""
 
 
 class HeldPlatform(PlatformPose):
@@ -71,7 +56,7 @@ class HeldPlatform(PlatformPose):
         self,
         *,
         duration: float = _TRIM_TIME,
-        travel: float = _TRAVEL,
+        travel: float = TRAVEL,
         speed: float = _TRIM_SPEED,
         axial_stiffness: float | None = None,
         keep: Array | None = None,
@@ -158,7 +143,7 @@ class HeldPlatform(PlatformPose):
         preload: Preload | None = None,
         pose: Pose | None = None,
         duration: float | None = None,
-        travel: float = _TRAVEL,
+        travel: float = TRAVEL,
         speed: float = _HOLD_SPEED,
         axial_stiffness: float | None = None,
         hold: float = DEAD_MAN,
@@ -211,7 +196,9 @@ class HeldPlatform(PlatformPose):
             force = self._preloaded(here, preload)
             self.corrections.require_balance(here, force)
             loops.append(
-                self.corrections.force_loop(here, force, self._angles()[0], speed, axial_stiffness)
+                self.corrections.force_loop(
+                    here, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
+                )
             )
         if pose is not None:
             require_type(pose, Pose, "pose")
@@ -263,20 +250,35 @@ class HeldPlatform(PlatformPose):
             raise MotionError("no preload is held that could be changed; begin with hold")
         loop.aim(self._preloaded(self.pose, preload))
 
-    def held(self) -> Held:
-        """What is or was held last, and how far it is from it.
+    def held(self) -> dict[str, Any]:
+        """What is held, or was held last, and how far the platform is from it.
 
         Raises MotionError where nothing was held.
+
+        Returns
+        -------
+        dict
+            By cable ``force`` (set-point) and ``measured``, N, and ``missing``, of the forces that
+            balance each other, N; ``position_error``, m, and ``rotation_error``, rad, mean of the
+            tracker's newest 50 poses. None for what is not held, or not measured.
         """
         if not self._held:
             raise MotionError("nothing was held; begin with hold")
-        force = error = None
+        out: dict[str, Any] = dict.fromkeys(
+            ("force", "measured", "missing", "position_error", "rotation_error")
+        )
         for loop in self._held:
-            if isinstance(loop, ForceLoop):
-                force = loop.force
+            if isinstance(loop, PoseLoop):
+                error = loop.mean_error
+                out["position_error"] = finite_or_none(float(np.linalg.norm(error[:3])))
+                out["rotation_error"] = finite_or_none(float(np.linalg.norm(error[3:])))
             else:
-                error = loop.error
-        return Held(force, self.corrections.readings(self._bench.clock.now()), error)
+                measured = self.corrections.readings(self._bench.clock.now())
+                found = {"force": loop.force, "measured": measured, "missing": loop.error}
+                for name, values in found.items():
+                    told = map(finite_or_none, values.tolist())
+                    out[name] = dict(zip(self.robot.names, told, strict=True))
+        return out
 
     def _hold_for(self, duration: float, hold: float) -> None:
         """Refresh what was just started for a duration (s); returns at rest."""
@@ -320,13 +322,15 @@ class HeldPlatform(PlatformPose):
         force: Array,
         *,
         duration: float = _TRIM_TIME,
-        travel: float = _TRAVEL,
+        travel: float = TRAVEL,
         speed: float = _TRIM_SPEED,
         axial_stiffness: float | None = None,
         hold: bool,
     ) -> list[CableCorrection]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
-        loop = self.corrections.force_loop(pose, force, self._angles()[0], speed, axial_stiffness)
+        loop = self.corrections.force_loop(
+            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
+        )
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration
         )

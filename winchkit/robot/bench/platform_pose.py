@@ -80,9 +80,10 @@ class PlatformPose:
         Raises NotPermitted where they fit no pose, or two that the cables can hold.
         """
         angles, start = self._angles(), self._last or self.robot.home
-        found = self.robot.poses_at(angles, start, tolerance=np.inf, search=np.inf)
+        pulled = self._forces(start)
+        found = self.robot.poses_at(angles, start, pulled, tolerance=np.inf, search=np.inf)
         if not self._continues(found):
-            found = self.robot.poses_at(angles, tolerance=np.inf, search=-1.0)
+            found = self.robot.poses_at(angles, None, pulled, tolerance=np.inf, search=-1.0)
             self._require_one(found)
         if np.isfinite(found.pose.position).all():
             forces = self._forces(found.pose)

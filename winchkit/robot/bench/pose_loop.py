@@ -9,6 +9,7 @@ noise σ of a pose, of one per T, moves the platform by σ √(T / 2τ).
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -29,6 +30,9 @@ _JUMP = np.array([1e-3, math.radians(0.2)])
 speed of the correction (rule of thumb)."""
 _DISAGREEMENT = np.array([5e-3, math.radians(1.0)])
 """A payload moves a platform on elastic cables by less (rule of thumb)."""
+
+_SHOWN = 50
+"""Poses of whose mean deviation a user is told: half a second at 100 Hz."""
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,12 @@ class PoseLoop:
         self._watch, self._latch = watch, latch
         self._moved = -np.linalg.pinv(by_pose)
         self._seen: TrackedPose | None = None
+        self._errors: deque[Array] = deque(maxlen=_SHOWN)
+
+    @property
+    def mean_error(self) -> Array:
+        """Mean of the newest 50 of :attr:`error`, (6,); NaN before the first."""
+        return np.asarray(np.mean(list(self._errors) or [self.error], axis=0))
 
     def left(self, index: int) -> str:
         """Cable by which the platform is off its pose."""
@@ -150,6 +160,7 @@ class PoseLoop:
         newest = self._newest()
         if newest is not None and newest is not self._seen:
             self._seen, self.error = newest, self.deviation(newest)
+            self._errors.append(self.error)
         trip = self._watch.at(now, newest, self.error, self._moved @ wound)
         if trip is not None:
             self._latch(trip)
