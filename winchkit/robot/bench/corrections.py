@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from winchkit.bench.host import WinchHost
 from winchkit.bench.tracker import Tracker
 from winchkit.bench.winch import Winch
 from winchkit.errors import NotPermitted
+from winchkit.estimation.groups import groups_of
 from winchkit.robot.bench.correction import Bounds, Correction, Loop
 from winchkit.robot.bench.force_loop import UNBALANCED, ForceLoop, ForceSetting, PathForces
 from winchkit.robot.bench.path_time import PathTime
@@ -22,6 +24,7 @@ from winchkit.robot.forces.force_distribution import null_space
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.profiles.instruments import UNKNOWN
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.robot_bench import RobotWiring
 
 TRAVEL = 0.01
@@ -31,6 +34,12 @@ _ALONG_SPEED, _ALONG_END = 0.02, 1.0
 """Of each cable in a correction during a motion, m/s, and its time after the end, s."""
 _PROBE = 1.0
 """Force by which the elasticity of a cable is tried in the profile, N."""
+
+
+def _unknown(profile: WinchProfile) -> float:
+    """Standard deviation of a cell's reading by its pulleys, as a share; 0 where none is known."""
+    known = sum(group.sliding_std for group in groups_of(profile))
+    return known if math.isfinite(known) else 0.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +91,7 @@ class Corrections:
                 )
             newest = cell.latest
             filtered = 0.0 if newest is None else newest.t_receive - newest.t_sample
-            delays.append((filtered, cell.period))
+            delays.append(filtered + cell.period)
         self._require_torque(force, angles)
         late = max(winch.wiring.limits.response_time for winch in self.winches)
         stiffness, known = self._stiffness(pose, force, angles, axial_stiffness)
@@ -92,10 +101,11 @@ class Corrections:
             self.balanced(pose),
             stiffness,
             known,
-            max(filtered + period for filtered, period in delays) + late,
-            float(np.mean([filtered + period / 2 for filtered, period in delays])) + late / 2,
+            max(delays) + late,
+            float(np.mean(delays)) + self.bench.loop.cycle + late / 2,
             speed,
             min(winch.wiring.limits.acceleration for winch in self.winches),
+            np.array([_unknown(line.profile) for line in self.robot.lines]),
         )
         return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
 

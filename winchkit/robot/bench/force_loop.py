@@ -9,6 +9,10 @@ A change of the set-point is fed forward where the stiffnesses are known: the ca
 P Δf / k on an S-curve of one duration for all, and the loop compares the readings with the
 set-point that this ramp had when they were taken.
 
+The friction of pulleys between cell and platform is removed from the readings by the effects of the
+profile. Where their standard deviation is declared, deviations that it explains are not corrected:
+the preload is not changed by what the cells do not know.
+
 The rest of the deviation, (1 − P)(f_s − f), is what the readings and the weight contradict each
 other by, whatever the preload is: a cell that jumps or stands still shows there.
 """
@@ -32,6 +36,9 @@ UNBALANCED = 0.2
 friction of three pulleys, and a payload that is not declared, stay below (rule of thumb)."""
 _UNBALANCED_TIME = 0.1
 """A swinging platform unbalances its cables for less, s."""
+_EXPLAINED = 2.0
+"""Standard deviations of the readings, by the friction that is not known, within which a deviation
+is not corrected."""
 _FEED = 0.8
 """Share of speed and acceleration for the change of the set-point; the loop has the rest."""
 _RISE = 0.05
@@ -59,6 +66,8 @@ class ForceSetting:
     """m/s."""
     acceleration: float
     """m/s^2."""
+    unknown: Array
+    """Standard deviation of the readings by the friction of the pulleys, as a share, (n,)."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +124,7 @@ class ForceLoop:
         self._ramp: Trajectory | None = None
         self._begun = 0.0
         self.error = self._change
-        """Forces that balance each other and are missing, (n,), N."""
+        """Missing forces that balance each other, beyond what friction explains, (n,), N."""
         self._unbalanced_since = float("inf")
 
     def aim(self, force: Array) -> None:
@@ -139,7 +148,9 @@ class ForceLoop:
         missing = force - shown
         balanced = projection @ missing
         self._watch(now, missing - balanced, force)
-        self.error = balanced - self._change * (1.0 - self._share(time - setting.lag)[0])
+        self.error = self._beyond(
+            balanced - self._change * (1.0 - self._share(time - setting.lag)[0]), projection, shown
+        )
         feed = self._change * self._share(time)[1]
         if self._path is not None and self._path.feeds and setting.known:
             feed = self._path.rate
@@ -148,16 +159,26 @@ class ForceLoop:
     def _begin(self, time: float, force: Array, shown: Array) -> None:
         """Plan the change from the forces of now."""
         setting = self.setting
-        before = shown if self._aimed is None else self._aimed
         rest = self._change * (1.0 - self._share(time)[0])
+        if self._aimed is None:
+            change = setting.balanced @ (force - shown)
+            change = self._beyond(change, setting.balanced, shown)
+        else:
+            change = setting.balanced @ (force - self._aimed)
         self._aimed, self._begun = force, time
         if not setting.known:
             return
-        self._change = setting.balanced @ (force - before) + rest
+        self._change = change + rest
         way = float(np.abs(self._change / setting.stiffness).max())
         if way > 0.0:
             acceleration = _FEED * setting.acceleration
             self._ramp = plan(way, _FEED * setting.speed, acceleration, acceleration / _RISE)
+
+    def _beyond(self, error: Array, projection: Array, shown: Array) -> Array:
+        """What of an error (n,) the friction of the pulleys does not explain, shortened by it."""
+        variance = float(np.diag(projection) @ (self.setting.unknown * shown) ** 2)
+        size = float(np.linalg.norm(error))
+        return error * max(0.0, 1.0 - _EXPLAINED * variance**0.5 / size) if size else error
 
     def _share(self, time: float) -> tuple[float, float]:
         """Share of the change that is made at a time (s), and its rate, 1/s."""
