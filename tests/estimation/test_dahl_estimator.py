@@ -18,7 +18,8 @@ from estimation_plant import WRAPS, cell_readings, wander
 from winchkit.errors import UsageError
 from winchkit.estimation import PLAIN, DahlEstimator, Kernels, PulleyGroup, compiled, fastest
 
-GROUP = PulleyGroup(WRAPS, friction=0.02, stiffness=1500.0)
+EXACT = ((0.0,) * 3,) * 3
+GROUP = PulleyGroup(WRAPS, friction=0.02, stiffness=1500.0, covariance=EXACT)
 moves = st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=40)
 shapes = st.sampled_from([0.5, 1.0, 1.3, 2.0])
 
@@ -110,7 +111,7 @@ def test_a_closed_loop_costs_energy(sizes: list[float], shape: float) -> None:
 @pytest.mark.parametrize("shape", [0.7, 1.0, 1.00001, 1.4, 2.0])
 @pytest.mark.parametrize("name", ["friction", "stiffness", "shape"])
 def test_the_std_is_that_of_a_perturbed_parameter(name: str, shape: float) -> None:
-    group = PulleyGroup((pi, pi / 2), 0.01, 800.0, shape)
+    group = PulleyGroup((pi, pi / 2), 0.01, 800.0, shape, EXACT)
     index = ("friction", "stiffness", "shape").index(name)
     step = 1e-4 * getattr(group, name)
     covariance = np.zeros((3, 3))
@@ -145,6 +146,33 @@ def test_the_std_holds_what_parameters_drawn_at_random_do() -> None:
     )
     later = slice(150, None)
     assert np.median(std[later] / spread[later]) == pytest.approx(1.0, abs=0.15)
+
+
+def test_parameters_whose_std_nobody_declares_leave_the_std_unknown() -> None:
+    estimator = DahlEstimator([replace(GROUP, covariance=PulleyGroup(WRAPS, 0.02, 1.0).covariance)])
+    value, std = estimator.update(300.0, 0.0)
+    assert value == 300.0
+    assert isnan(std)
+
+
+@pytest.mark.slow
+def test_two_stds_hold_the_error_of_friction_and_stiffness_that_are_off() -> None:
+    """Friction 10 % and stiffness 30 % off, one standard deviation each, as declared."""
+    random = np.random.default_rng(5)
+    covariance = tuple(map(tuple, np.diag([0.1 * 0.02, 0.3 * 1500.0, 0.0]) ** 2))
+    _, platform, wound = wander(20.0)
+    cell = cell_readings(platform, wound, shape=1.0)
+    held, exact = [], []
+    for mu, sigma in 1.0 + random.standard_normal((40, 2)) * [0.1, 0.3]:
+        group = replace(GROUP, friction=0.02 * mu, stiffness=1500.0 * max(0.1, sigma))
+        told = estimates(DahlEstimator([replace(group, covariance=covariance)]), cell, wound)
+        error = np.abs(told[:, 0] - platform)[300:]
+        held.append(np.mean(error <= 2.0 * told[300:, 1]))
+        exact.append(
+            np.mean(error <= 2.0 * estimates(DahlEstimator([group]), cell, wound)[300:, 1])
+        )
+    assert 0.90 <= np.mean(held) <= 0.99
+    assert np.mean(exact) < 0.2, "taken as exact it is far too small"
 
 
 def test_an_unknown_start_is_reported_until_the_cable_has_moved() -> None:

@@ -21,8 +21,11 @@ _RECORDS = ("records/latch.py", "records/position_file.py")
 
 def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
     source = "".join(
-        (ROOT / "winchkit/bench" / name).read_text(encoding="utf-8")
-        for name in ("control/loop.py", "hardware.py", *_RECORDS, "winch.py")
+        (ROOT / "winchkit" / name).read_text(encoding="utf-8")
+        for name in (
+            *(f"bench/{own}" for own in ("control/loop.py", "hardware.py", *_RECORDS, "winch.py")),
+            *(f"robot/bench/{own}.py" for own in ("correction", "force_loop", "pose_loop")),
+        )
     )
     raised = set(re.findall(r'Trip\(\s*"([a-z ]+)"', source))
     assert raised == {row.kind for row in BENCH_CONDITIONS}

@@ -19,7 +19,7 @@ profile = "winding-device-8"
 speed = "0.2 m/s"
 rotation_speed = "20 deg/s"
 tension = ["60 N", "800 N"]
-tension_trim = true
+tension_trim = "end"
 tracker = { listen = "udp://127.0.0.1:5100" }
 [bus.can]
 kind = "can"
@@ -49,7 +49,7 @@ def test_a_robot_is_read_in_si(tmp_path: Path) -> None:
     assert spec.robot.tension == (60.0, 800.0)
     assert spec.robot.rotation_speed == pytest.approx(radians(20))
     assert spec.robot.lost_winch == "stop-together"
-    assert spec.robot.tension_trim
+    assert spec.robot.tension_trim == "end"
     assert spec.robot.tracker.frame == "tracker"
     again = load(write_bench(spec, tmp_path / "again.toml")).value
     assert again == spec

@@ -9,6 +9,7 @@ from winchkit import wings
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.sim_platform import PlatformTruth
 
 
 class WiredRobot(Protocol):
@@ -24,6 +25,10 @@ class WiredRobot(Protocol):
     @property
     def mass(self) -> float:
         """Mass of the platform, kg."""
+
+    @property
+    def truth(self) -> PlatformTruth:
+        """The platform of a rehearsal, as the profile declares it."""
 
     def platform(self, bench: Any, winches: Mapping[str, Any]) -> Any:
         """The platform that the winches of an open bench move: ``bench.robot``."""

@@ -175,6 +175,12 @@ class Tracker:
             self.received += 1
             self._poses.append(pose)
 
+    @property
+    def newest(self) -> TrackedPose | None:
+        """Newest pose; None before the first."""
+        with self._lock:
+            return self._poses[-1] if self._poses else None
+
     def since(self, time: float) -> list[TrackedPose]:
         """Return the poses that were received after a time.
 

@@ -8,8 +8,8 @@ from winchkit.arguments import number, positive
 from winchkit.bench.cells.tares import await_device_tare, host_tare
 from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
 from winchkit.bench.control.homing_motion import HomingRequest
-from winchkit.bench.control.motion import Jog, MotionSource, Move, StartGate, Trim
-from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.control.motion import Held, Jog, MotionSource, Move, StartGate, Trim
+from winchkit.bench.control.snapshot import Direction, Trip
 from winchkit.bench.control.supervisor import direction_of
 from winchkit.bench.control.tension_control import (
     TensionControl,
@@ -21,7 +21,7 @@ from winchkit.bench.winch_status import WinchStatus
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.units import parse
 
-_LONGEST_HOLD = 1.0
+LONGEST_HOLD = 1.0
 """s: a motion without its commander lasts no longer."""
 _POLL = 0.01
 """s: two or more cycles at the usual 4 ms."""
@@ -58,7 +58,7 @@ class Winch(WinchStatus):
         """
         no_positional("jog", "m/s", unnamed)
         winding_speed = -paid_out("jog", pay_out, wind_in)
-        hold = positive("jog", "hold", hold, _LONGEST_HOLD)
+        hold = positive("jog", "hold", hold, LONGEST_HOLD)
         if duration is None:
             self._begin_jog(winding_speed, hold)
             return
@@ -90,7 +90,7 @@ class Winch(WinchStatus):
         no_positional("refresh", "m/s", unnamed)
         named = pay_out is not None or wind_in is not None
         winding_speed = -paid_out("refresh", pay_out, wind_in) if named else None
-        self.extend(winding_speed, positive("refresh", "hold", hold, _LONGEST_HOLD))
+        self.extend(winding_speed, positive("refresh", "hold", hold, LONGEST_HOLD))
 
     def release(self) -> None:
         """End a jog or a held tension by a ramp now, instead of when its time is over."""
@@ -149,9 +149,12 @@ class Winch(WinchStatus):
                 self.require_length()
             self._refresh(motion.dead_man, now, hold)
             motion.request(wanted)
-        else:
-            self.permit(direction_of(motion.setting.tension - self.snapshot.load_tension))
-            self._refresh(motion.dead_man, now, hold)
+            return
+        direction = Direction.BOTH
+        if isinstance(motion, TensionControl):
+            direction = direction_of(motion.setting.tension - self.snapshot.load_tension)
+        self.permit(direction)
+        self._refresh(motion.dead_man, now, hold)
 
     def _refresh(self, dead_man: DeadMan, now: float, hold: float) -> None:
         """Extend a permission; raises MotionError naming the winch."""
@@ -195,7 +198,7 @@ class Winch(WinchStatus):
         """Begin a jog; one without a duration is held, and not started by repeats."""
         self.require_speed(winding_speed)
         if duration is None:
-            self._require_new()
+            self.require_new()
         self.permit(direction_of(winding_speed))
         if duration is not None or not self._permits_unhomed(winding_speed):
             self.require_length()
@@ -204,7 +207,7 @@ class Winch(WinchStatus):
         known = limits if self.snapshot.length_known else limits.without_length
         self.begin(Jog(self._parts.cable, known, winding_speed, DeadMan(expires)))
 
-    def _require_new(self) -> None:
+    def require_new(self) -> None:
         """Raise where a held motion is asked for again instead of refreshed."""
         if self.held:
             raise MotionError(
@@ -326,7 +329,7 @@ class Winch(WinchStatus):
         call = "hold_tension"
         force = parse(tension, "force") if isinstance(tension, str) else tension
         wanted = positive(call, "tension", force)
-        hold = positive(call, "hold", hold, _LONGEST_HOLD)
+        hold = positive(call, "hold", hold, LONGEST_HOLD)
         if duration is not None:
             duration = positive(call, "duration", duration)
             self.require_waiting("hold_tension(duration=...)")
@@ -355,7 +358,7 @@ class Winch(WinchStatus):
                 f"tension_high, {high:g} N"
             )
         here = self.snapshot
-        self._require_new()
+        self.require_new()
         self.permit(direction_of(tension - here.load_tension))
         self.require_length()
         self._bench.permit_tension(self.name)
@@ -495,7 +498,8 @@ class Winch(WinchStatus):
             Common start with other winches.
         """
         with self._bench.commanders.claimed(self.name):
-            self._held = source if isinstance(source, Jog | TensionControl) else None
+            held: object = source
+            self._held = held if isinstance(held, Held) else None
             self.stopped_by = ""
             self._controller.begin(source, gate)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import Jog
+from winchkit.bench.control.motion import Held
 from winchkit.bench.control.snapshot import Direction, Phase, WinchSnapshot
 from winchkit.bench.control.tension_control import TensionControl, TensionReading
 from winchkit.bench.control.winch_state import WinchParts
@@ -32,7 +32,7 @@ class WinchStatus:
         """Instruments by role: cell, load, length, temperature."""
         self._bench, self._parts = bench, parts
         self._controller = parts.controller
-        self._held: Jog | TensionControl | None = None
+        self._held: Held | None = None
         """The newest motion, where it is one that must be refreshed."""
         self.stopped_by = ""
         """Who ended the last motion before its end; empty without one."""

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, isfinite
+from math import cos, isfinite, nan, sin
+from typing import TYPE_CHECKING
 
-from winchkit.errors import UsageError
+from winchkit.errors import FileError, UsageError
+from winchkit.units import dimension_of, parse
+
+if TYPE_CHECKING:
+    from winchkit.schema.profiles.winch import WinchProfile
+
+_DAHL = "pulley-dahl"
 
 PULLEY_SLOTS = 5
 """Per pulley: cosine of the wrap, μ, σ, β, index of its group."""
@@ -26,14 +33,22 @@ class PulleyGroup:
     """σ, N/m."""
     shape: float = 1.0
     """β."""
-    covariance: tuple[tuple[float, float, float], ...] = ((0.0,) * 3,) * 3
-    """Of μ, σ and β; zero where they are taken as exact."""
+    covariance: tuple[tuple[float, float, float], ...] = ((nan,) * 3,) * 3
+    """Of μ, σ and β; NaN where nobody declares it, zero for what is taken as exact."""
 
     @property
     def std(self) -> tuple[float, float, float]:
         """Standard deviations of μ, σ and β."""
         first, second, third = (self.covariance[k][k] ** 0.5 for k in range(3))
         return first, second, third
+
+    @property
+    def sliding_std(self) -> float:
+        """Standard deviation of the friction of all pulleys in motion, as a share of the tension.
+
+        NaN where that of μ is not known.
+        """
+        return self.std[0] * sum(2.0 * sin(wrap / 2.0) for wrap in self.wraps)
 
     def check(self) -> None:
         """Raise UsageError for values outside of what a pulley can have."""
@@ -49,6 +64,35 @@ class PulleyGroup:
                 )
         if not self.wraps or not all(isfinite(wrap) and wrap >= 0 for wrap in self.wraps):
             raise UsageError(f"wraps of a pulley group are {self.wraps}; give at least one, in rad")
+
+
+def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
+    """The pulleys of a winch with the friction of its effect ``pulley-dahl``; empty without one.
+
+    Standard deviations of friction and stiffness are those of the table ``fitted`` of the effect;
+    NaN where it has none. Raises FileError for values that the effect cannot have.
+    """
+    from winchkit.effects.bind import values_of
+    from winchkit.effects.catalogue import load_catalogue
+
+    table = next((one for one in profile.effect if one.id == _DAHL), None)
+    if table is None or not profile.pulley:
+        return ()
+    effect = load_catalogue()[_DAHL]
+    values, faults = values_of(effect, table)
+    if faults:
+        raise FileError(faults)
+    told = table.values.get("fitted", {}).get("std", {})
+    names = ("friction", "stiffness")
+    std = [
+        parse(told[n], dimension_of(effect.parameter(n).unit) or "ratio") if n in told else nan
+        for n in names
+    ]
+    wraps = tuple(pulley.wrap for pulley in profile.pulley)
+    covariance = ((std[0] ** 2, 0.0, 0.0), (0.0, std[1] ** 2, 0.0), (0.0, 0.0, 0.0))
+    return (
+        PulleyGroup(wraps, values["friction"], values["stiffness"], values["shape"], covariance),
+    )
 
 
 def flat_pulleys(groups: Sequence[PulleyGroup]) -> list[float]:

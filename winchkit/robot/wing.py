@@ -64,7 +64,13 @@ WING = Wing(
                 "winchkit.robot.cli.workspace",
                 "Compute where a cable robot's cables hold its platform.",
             ),
-        }
+        },
+        "Bench": {
+            "hold-platform": (
+                "winchkit.robot.cli.hold_platform",
+                "Hold cable forces and pose of a robot by its cells and tracker.",
+            ),
+        },
     },
     effects=("winchkit.robot.effects.on_robot",),
     renderers=("winchkit.robot.report.notebook",),

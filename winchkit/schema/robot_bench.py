@@ -12,6 +12,7 @@ from winchkit.schema.quantity import (
     Angle,
     Length,
     PositiveAcceleration,
+    PositiveDuration,
     PositiveForce,
     PositiveLength,
     PositiveSpeed,
@@ -32,6 +33,8 @@ class TrackerWiring(Table):
     """Address at which this computer receives them, ``udp://HOST:PORT``."""
     frame: str = "tracker"
     """Name of the frame in which the poses are given."""
+    max_age: PositiveDuration = 0.1
+    """Age of the newest pose at which a pose that is held by it trips the bench, s."""
 
     def rules(self) -> Iterator[Rule]:
         """The address has a host and a port."""
@@ -91,8 +94,11 @@ class RobotWiring(Table):
     """Deceleration of the fastest cable in a quick stop, m/s^2: 6085h of the drives, scaled at the
     beginning of each motion so that all cables stop in the same time; None leaves 6085h."""
     lost_winch: LostWinch = "stop-together"
-    tension_trim: bool = False
-    """Whether the cable forces are corrected at the end of each motion, by the load cells."""
+    tension_trim: Literal["none", "end", "along"] = "none"
+    """Whether the cable forces are corrected by the load cells: at the end of each motion, or all
+    along it."""
+    axial_stiffness: PositiveForce | None = None
+    """EA of the cables in corrections of their forces, N; by default that of the profile."""
     tracker: TrackerWiring | None = None
     clearance: PositiveLength | None = None
     """Least distance of the cables from each other and from bodies, m; the first two clearances of

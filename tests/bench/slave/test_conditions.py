@@ -153,7 +153,10 @@ def test_a_condition_on_the_bench_that_is_switched_off_makes_a_test_fail(
         happens(tmp_path, case)
 
 
-ELSEWHERE = {"tension control", "motion", "owner", "position record"}
+ELSEWHERE = {
+    *("tension control", "motion", "owner", "position record"),
+    *("correction", "cable forces", "tracker age", "tracker jump", "tracker disagreement"),
+}
 """Conditions of a motion that is no jog, of its end, and of records: test_tension_control.py,
 test_motor_that_does_not_turn.py, test_power_cycle.py, test_position_file.py."""
 

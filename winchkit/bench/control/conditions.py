@@ -515,8 +515,33 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition(
         "tension control",
-        "cable that a held tension, or a trim of a robot, has moved, while it asks for more",
-        "the declared travel, by default 100 mm (trim: 10 mm), for 0.5 s",
+        "cable that a held tension has moved, while it asks for more",
+        "the declared travel, by default 100 mm, for 0.5 s",
+    ),
+    BenchCondition(
+        "correction",
+        "cable that a correction of a platform's forces or pose has moved, while it asks for more",
+        "the declared travel, by default 10 mm, for 0.5 s",
+    ),
+    BenchCondition(
+        "cable forces",
+        "measured cable forces of a platform against its weight, while they are corrected",
+        "a fifth of the mean set-point, for 0.1 s",
+    ),
+    BenchCondition(
+        "tracker age",
+        "age of the newest pose that differs from the one before, while a pose is held",
+        "`max_age` of the tracker, by default 0.1 s",
+    ),
+    BenchCondition(
+        "tracker jump",
+        "change between two poses of the tracker, while a pose is held",
+        "1 mm, 0.2 deg, and what `speed` and `rotation_speed` of [robot] make in the time between",
+    ),
+    BenchCondition(
+        "tracker disagreement",
+        "change of the tracker's pose against that by the motor angles, since a pose is held",
+        "5 mm, 1 deg",
     ),
     BenchCondition(
         "motion",

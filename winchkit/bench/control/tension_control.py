@@ -22,6 +22,9 @@ from winchkit.schema.profiles.winch import CableSpec
 LOOP = 0.25
 """Gain times stiffness times delay: of 0.37, the limit of a response without overshoot, and 1.57,
 the limit of stability, of an integrator with a delay."""
+HELD = 0.01
+"""Share of the set-point by which a held tension may differ at its end: the class of usual load
+cells in a chain with pulleys (rule of thumb)."""
 _MARGIN = 2e-3
 """Distance that is kept from the end of the declared travel, m."""
 _STUCK = 0.5

@@ -105,7 +105,7 @@ class Station:
         Parameters
         ----------
         winch : str or None
-            Winch; None for the only one.
+            Winch, "all", as of a platform that is held, or None for the only one.
         pay_out, wind_in : float, optional
             Another speed of a jog, m/s, positive; at most one is given.
         hold : float
@@ -119,7 +119,7 @@ class Station:
         Parameters
         ----------
         winch : str or None
-            Winch; None for the only one.
+            Winch, "all", as of a platform that is held, or None for the only one.
         """
 
     @_operation(begins=True)
@@ -216,6 +216,43 @@ class Station:
         bounds : mapping of str to float
             ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
             ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
+        """
+
+    @_operation(begins=True)
+    def hold_platform(
+        self,
+        preload: float | Mapping[str, float] | None,
+        pose: Mapping[str, float] | None,
+        hold: float,
+        bounds: Mapping[str, float],
+    ) -> None:
+        """Begin to hold forces and pose of the robot's platform for ``hold`` seconds.
+
+        ``refresh("all")`` goes on.
+
+        Parameters
+        ----------
+        preload : float or mapping of str to float, optional
+            As of ``bench.robot.hold``, N.
+        pose : mapping of str to float, optional
+            Some of x, y, z (m), roll, pitch, yaw (rad) to be held by the tracker; the others are
+            those of the present pose.
+        hold : float
+            Time without a refresh, s, at most 1.
+        bounds : mapping of str to float
+            ``travel``, m, ``speed``, m/s, and ``axial_stiffness``, N, of the cables, as of
+            ``bench.robot.hold``; each may be left out.
+        """
+
+    @_operation()
+    def platform_held(self) -> dict[str, Any]:
+        """Set-point and measured values of what the platform holds, or held last.
+
+        Returns
+        -------
+        dict
+            By cable ``force`` and ``measured``, N, and ``missing``, of the forces that balance each
+            other; ``position_error``, m, and ``rotation_error``, rad. None for what is not held.
         """
 
     @_operation()

@@ -88,11 +88,13 @@ class LocalStation(OwnedLog, Station):
         hold: float = DEAD_MAN,
     ) -> None:
         with self._acting():
-            self._bench.named(winch).refresh(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
+            for item in self._chosen(winch):
+                item.refresh(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
         with self._acting():
-            self._bench.named(winch).release()
+            for item in self._chosen(winch):
+                item.release()
 
     def step(
         self,
@@ -155,6 +157,21 @@ class LocalStation(OwnedLog, Station):
     ) -> None:
         with self._acting():
             self._bench.named(winch).hold_tension(tension, hold=hold, **bounds)
+
+    def hold_platform(
+        self,
+        preload: float | Mapping[str, float] | None,
+        pose: Mapping[str, float] | None,
+        hold: float,
+        bounds: Mapping[str, float],
+    ) -> None:
+        platform = self._bench.robot
+        goal = None if pose is None else platform.moved(pose, relative=False)
+        with self._acting():
+            platform.hold(preload=preload, pose=goal, hold=hold, **bounds)
+
+    def platform_held(self) -> dict[str, Any]:
+        return self._bench.robot.held()
 
     def take_over(self, winch: str | None) -> None:
         with self._acting():

@@ -18,8 +18,11 @@ from winchkit.cli.core.options import (
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
+from winchkit.errors import MotionError
 
 _NEEDS_CELL = "needs a bench with a load cell"
+_REHEARSED = 1.0
+"""Time of a dry run, s."""
 
 
 @click.command(
@@ -84,9 +87,12 @@ def command(
     """Keep the tension of WINCH's cable at TENSION (at its platform end, by the load cell).
 
     The winch moves with a speed proportional to the tension error. It comes to rest within 0.2 s
-    of the end of this command, without a fresh reading, and at the declared travel.
+    of the end of this command, without a fresh reading, and at the declared travel. Exit code 5
+    where the tension is more than 1 % from TENSION at the end of --for. A robot's platform:
+    `winchkit hold-platform`.
     """
     from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+    from winchkit.bench.control.tension_control import HELD
     from winchkit.cli.core.dry_run import station_for
     from winchkit.cli.core.quantities import optional, quantity, seconds
 
@@ -96,15 +102,29 @@ def command(
     if (bound := optional(stiffness, "stiffness")) is not None:
         bounds["stiffness"] = bound
     with station_for(
-        bench, client="hold-tension", dry_run=dry_run, effects=effects, winch=winch
+        bench,
+        client="hold-tension",
+        dry_run=dry_run,
+        effects=effects,
+        winch=winch,
+        tension=wanted,
     ) as station:
         if take_over:
             station.take_over(winch)
         station.hold_tension(winch, wanted, DEAD_MAN, bounds)
-        hold_on(station, winch, math.inf if limit is None else limit)
+        hold_on(station, winch, _REHEARSED if dry_run else math.inf if limit is None else limit)
+        reached = station.status()["winch"][winch]["load_tension"]
         station.release(winch)
         while station.moving(winch):
             station.clock.sleep(REFRESH)
         status = station.status()
-    if not dry_run:
-        tell(status, [status_line(status)])
+    if dry_run:
+        return
+    tell({**status, "set_tension": wanted, "reached": reached}, [status_line(status)])
+    if reached is None or abs(wanted - reached) > HELD * wanted:
+        shown = "without a valid reading" if reached is None else f"{reached:.1f} N"
+        raise MotionError(
+            f"winch {winch}: {shown} at the end of the {limit or 0.0:g} s, set are {wanted:.1f} N "
+            f"(limit of the difference {HELD:.0%}, {HELD * wanted:.1f} N); hold it longer, or give "
+            "--stiffness: by the bound of the profile a soft cable is slow"
+        )

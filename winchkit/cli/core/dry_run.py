@@ -20,11 +20,16 @@ if TYPE_CHECKING:
     from winchkit.bench.remote.operations import Station
     from winchkit.drivers.can.tools.decode import Decoded, KnownNode
     from winchkit.schema.bench import BenchSpec
+    from winchkit.schema.sim_platform import PlatformTruth
     from winchkit.schema.simbench import SimBench
     from winchkit.sim.live.buses import Carried
 
 _CYCLIC = ("SYNC", "RPDO", "heartbeat")
 _CONTROL_WORD = "6040h"
+_READINGS = 0.5
+"""Time in which the cells and the tracker of a rehearsal have shown something, s."""
+_NOISE = 0.1
+"""Of the cells of a rehearsal, N: one without noise counts as frozen."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +51,14 @@ def station_for(
     dry_run: bool,
     effects: Sequence[str] = (),
     winch: str | None = ALL,
+    tension: float | None = None,
+    platform: bool = False,
 ) -> Iterator[Station]:
     """A station at the bench or, for a dry run, at a rehearsal whose frames are then shown.
 
     ``client`` is the command's name, as other clients of the bench see it. A ``winch`` that the
-    bench lacks is refused before anything is opened.
+    bench lacks is refused before anything is opened. A rehearsal has cells, in place of none, where
+    a load of a ``tension`` (N) hangs on each cable, or its robot's ``platform`` on all.
     """
     from winchkit.bench.remote.session import at_station
     from winchkit.schema.read import read_bench
@@ -64,7 +72,7 @@ def station_for(
         return
     spec = spec.with_effects(effects)
     frames: list[Frame] = []
-    with _rehearsal(spec, frames) as station:
+    with _rehearsal(spec, frames, tension, platform=platform) as station:
         yield station
     show_frames(frames, nodes_of(spec))
 
@@ -157,27 +165,42 @@ def _summed(items: Sequence[Decoded]) -> Iterator[str]:
 
 
 @contextmanager
-def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
+def _rehearsal(
+    spec: BenchSpec, frames: list[Frame], tension: float | None, *, platform: bool
+) -> Iterator[Station]:
     """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
-    from winchkit.bench.robot import robot_of_bench
+    from winchkit.bench.robot import no_robot, robot_of_bench
+    from winchkit.bench.tracker import Tracker
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
+    from winchkit.units import GRAVITY
 
     click.echo(
         "dry run on simulated drives, each cable at its reference length; nothing is sent", err=True
     )
     clock, robot = SimulatedClock(), robot_of_bench(spec)
-    profiles, mass = None, None
-    if robot is not None:
+    mass = None if tension is None else tension / GRAVITY
+    profiles, body = None, None
+    if platform:
+        if robot is None:
+            raise no_robot(spec)
+        body = robot.truth
+    elif robot is not None:
         profiles = robot.profiles
-        mass = robot.mass / len(profiles)
-    with LiveBench(_simulated(spec, mass), profiles=profiles, simulated_time=clock) as live:
+        mass = mass or robot.mass / len(profiles)
+    simulated = _simulated(spec, mass, body, cells=platform or tension is not None)
+    with LiveBench(simulated, profiles=profiles, simulated_time=clock) as live:
         for name, wire in live.wire.items():
             wire.taps.append(_tap(name, clock.now(), frames))
         with open_bench(live.bench_spec, clock) as bench:
+            if live.robot is not None:
+                tracker = Tracker(clock.now)
+                live.robot.on_pose = tracker.receive
+                bench.take_tracker(tracker)
             station = LocalStation(bench)
+            clock.sleep(_READINGS if simulated.platform or tension else 0.0)
             yield station
             station.close()
 
@@ -193,24 +216,36 @@ def _tap(bus: str, start: float, frames: list[Frame]) -> Callable[[Carried], Non
     return take
 
 
-def _simulated(spec: BenchSpec, mass: float | None) -> SimBench:
-    """The bench as it is wired, without instruments, its declarations being true.
+def _simulated(
+    spec: BenchSpec, mass: float | None, body: PlatformTruth | None, *, cells: bool
+) -> SimBench:
+    """The bench as it is wired, without instruments or with ``cells``, its declarations being true.
 
-    ``mass`` (kg) is on a winch without a declared load. A trip of the rehearsal is not kept.
+    ``mass`` (kg) is on a winch without a declared load, or with cells on each. A trip of the
+    rehearsal is not kept.
     """
     from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
 
     winches = {
-        name: replace(winch, cell=None, load=None, length=None, temperature=None)
+        name: replace(
+            winch,
+            cell=winch.cell if cells else None,
+            load=winch.load if cells else None,
+            length=None,
+            temperature=None,
+        )
         for name, winch in spec.winch.items()
     }
-    buses = {name: bus for name, bus in spec.bus.items() if bus.kind == "can"}
+    used = {ref.bus for winch in winches.values() for ref in (winch.cell, winch.load) if ref}
+    buses = {name: bus for name, bus in spec.bus.items() if bus.kind == "can" or name in used}
     hanging = {
-        name: mass if one.load_mass is None else one.load_mass for name, one in winches.items()
+        name: mass if cells or one.load_mass is None else one.load_mass
+        for name, one in winches.items()
     }
     truth = {
         name: WinchTruth() if load is None else WinchTruth(load_mass=load)
         for name, load in hanging.items()
     }
     bench = replace(spec, winch=winches, bus=buses, latch_file="")
-    return SimBench(spec.name, bench, truth, NoiseSpec(), ())
+    noise = NoiseSpec(tension=_NOISE) if cells else NoiseSpec()
+    return SimBench(spec.name, bench, truth, noise, (), platform=body)

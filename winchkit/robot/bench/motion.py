@@ -2,69 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Target
-from winchkit.robot.bench.tension_trim import CableTrim
-from winchkit.robot.bench.trajectory import PlatformTrajectory
-
-_SHORTEST_STOP = 0.1
-"""Time in which the platform comes to rest at least, s."""
-
-
-class PathTime:
-    """Time along a planned motion, the same for all winches in a cycle.
-
-    A stop along the path lets it advance more and more slowly: the platform decelerates on its
-    path, and all cables come to rest together.
-    """
-
-    def __init__(self, planned: PlatformTrajectory, deceleration: float) -> None:
-        """``deceleration`` of a stop, m/s^2 along the path."""
-        self.duration = planned.duration
-        self.stopped = False
-        """Whether a stop was ordered before the end."""
-        self.stop_time = 0.0
-        """Of the ordered stop, s."""
-        self._planned, self._deceleration = planned, deceleration
-        self._cycle: float | None = None
-        self._now, self._rate = 0.0, 1.0
-        self._lock = threading.Lock()
-
-    def at(self, time: float) -> tuple[float, float]:
-        """Time along the motion (s) and its rate at the time of motion ``time`` (s).
-
-        The first winch that asks in a cycle advances it.
-        """
-        with self._lock:
-            if self._cycle is None:
-                self._cycle = time
-            step, self._cycle = time - self._cycle, time
-            if step > 0 and self._now < self.duration:
-                before = self._rate
-                if self.stopped:
-                    self._rate = max(0.0, before - step / self.stop_time)
-                self._now = min(self.duration, self._now + step * (before + self._rate) / 2)
-            return self._now, self._rate
-
-    @property
-    def ended(self) -> bool:
-        """Whether the platform has come to the end, or to rest on the way."""
-        return self._now >= self.duration or self._rate == 0.0
-
-    def slow_down(self) -> None:
-        """Come to rest on the path; a second order changes nothing."""
-        with self._lock:
-            if self.stopped or self._now >= self.duration:
-                return
-            if self._cycle is None:
-                self._rate = 0.0  # nothing has moved yet
-            speed = abs(float(self._planned.profile.at(self._now)[1]))
-            self.stop_time = max(_SHORTEST_STOP, speed / self._deceleration)
-            self.stopped = True
+from winchkit.robot.bench.correction import CableCorrection
+from winchkit.robot.bench.path_time import PathTime
 
 
 class CableMotion:
@@ -80,16 +24,17 @@ class CableMotion:
         cable: CableMap,
         *,
         holds: bool,
-        trim: CableTrim | None = None,
+        trim: CableCorrection | None = None,
+        along: bool = False,
     ) -> None:
         """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s).
 
-        ``trim`` corrects the cable forces at the end.
+        ``trim`` corrects the cable forces at the end, or ``along`` the motion.
         """
         self.holds = holds
         self.clock = clock
         self.trim = trim
-        self._trimming = False
+        self._trimming = self._along = trim is not None and along
         self._pieces: Sequence[Sequence[float]] = coefficients.T.tolist()
         self._step = step
         self._cable = cable
@@ -98,21 +43,26 @@ class CableMotion:
     def start(self, time: float, _angle: float, _winding_speed: float) -> None:
         """Begin at rest at the first angle of the plan."""
         self.clock.at(time)
+        if self._along and self.trim is not None:
+            self.trim.join(time)
 
     def target(self, time: float, angle: float, now: float) -> Target:
-        """Angle and velocity at the present time along the motion."""
-        if self._trimming and self.trim is not None:
-            return self.trim.target(time, angle, now)
+        """Angle and velocity at the present time along the motion, with the correction."""
         along, rate = self.clock.at(time)
         planned, velocity = self._planned(along)
         ended = self.clock.ended
         velocity = 0.0 if ended else velocity * rate
         arm = self._cable.at(angle)[1]
+        trim = self.trim
+        if trim is not None and self._trimming:
+            wound, speed = trim.at(time, now)
+            planned, velocity = planned + wound / arm, velocity + speed / arm
         done = ended and self._settled(time, (planned - angle) * arm)
-        if done and self.trim is not None and not self.clock.stopped:
-            self._trimming = True
-            self.trim.start(time, planned, 0.0)
-            done = False
+        if done and trim is not None:
+            if not self._trimming and not self.clock.stopped:
+                self._trimming = True
+                trim.join(time)
+            done = trim.correction.ended or not self._trimming
         return Target(velocity + GAIN * (planned - angle), planned, velocity * arm, done=done)
 
     def _settled(self, time: float, missing: float) -> bool:
@@ -147,13 +97,13 @@ class CableRunDown:
     def duration(self) -> float:
         """s."""
         trim = self._motion.trim
-        return max(self._motion.clock.stop_time, 0.0 if trim is None else trim.trim.duration)
+        return max(self._motion.clock.stop_time, 0.0 if trim is None else trim.correction.duration)
 
     def start(self, _time: float, _angle: float, _winding_speed: float) -> None:
         """Order the stop for all winches of the robot."""
         self._motion.clock.slow_down()
         if self._motion.trim is not None:
-            self._motion.trim.trim.end()
+            self._motion.trim.correction.end()
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """As along the motion, until it rests."""

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from winchkit.robot.bench.platform import Platform
 from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.bench import BenchSpec
+from winchkit.schema.profiles.instruments import FrameSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.robot_bench import RobotWiring
+from winchkit.schema.sim_platform import PlatformTruth, TrackerTruth
 
 if TYPE_CHECKING:
     from winchkit.bench.host import WinchHost
     from winchkit.bench.winch import Winch
+
+_STRETCH = 5e-3
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,25 @@ class RobotOfBench:
     def mass(self) -> float:
         """Mass of the platform, kg."""
         return self.robot.profile.platform.mass
+
+    @property
+    def truth(self) -> PlatformTruth:
+        """The platform of a rehearsal, as the profile declares it.
+
+        Without a moment of inertia its mass is at the anchor points; cables without a stiffness
+        have one at which the middle of ``tension`` stretches them by half a per cent, as of fibre.
+        """
+        profile, wiring = self.robot.profile, self.wiring
+        size = float(np.mean(np.sum(self.robot.geometry.anchor_point**2, axis=1)))
+        inertia = profile.platform.inertia or (2 / 3 * size * self.mass,) * 3
+        middle = sum(wiring.tension) / 2
+        declared = [line.profile.cable.axial_stiffness for line in self.robot.lines]
+        stiffness = min((one for one in declared if one is not None), default=middle / _STRETCH)
+        frame = profile.instrument.tracker.frame
+        tracker = TrackerTruth(position_noise=1e-5, rotation_noise=1e-5)
+        if isinstance(frame, FrameSpec):
+            tracker = replace(tracker, position=frame.position, rotation=frame.rotation)
+        return PlatformTruth(inertia, stiffness, middle, damping_time=2e-3, tracker=tracker)
 
     def platform(self, bench: WinchHost, winches: Mapping[str, Winch]) -> Platform:
         """The platform that the winches of an open bench move."""

@@ -194,6 +194,37 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
     return _judge(value, structure, wrench, low, high)
 
 
+def preloaded(structure: Array, wrench: Array, limits: ForceLimits, preload: Array) -> Forces:
+    """Solution with wanted forces in some cables, changed least from :func:`quadratic`.
+
+    Other parameters as of :func:`closed_form`.
+
+    Parameters
+    ----------
+    preload : (n,) array
+        Wanted forces, N; NaN in the other cables. More than balance each other are met with the
+        least sum of squares.
+
+    Returns
+    -------
+    Forces
+        Also where they are beyond the limits; NaN where no forces within the limits balance the
+        wrench.
+
+    Notes
+    -----
+    f = f_0 + N (N_k)⁺ (p − f_0)_k with the rows k of the null space N that are wanted.
+    """
+    low, high = limits.between(structure.shape[1])
+    start, null, given = (
+        quadratic(structure, wrench, limits),
+        null_space(structure),
+        ~np.isnan(preload),
+    )
+    share = np.linalg.pinv(null[given], rcond=_RANK) @ (preload - start.value)[given]
+    return _judge(start.value + null @ share, structure, wrench, low, high)
+
+
 def distributed_forces(structure: Array, wrench: Array, limits: ForceLimits) -> Array:
     """Cable forces within the limits that are closest to their middle, for many poses.
 

@@ -1,4 +1,4 @@
-"""Correction of cable forces: convergence, and bounds whatever the load cells read."""
+"""Control of cable forces: convergence, steps, and bounds whatever the load cells read."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from hypothesis import strategies as st
 
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
+from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.open import open_bench
 from winchkit.catalog import find
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.robot import Robot, robot_of
-from winchkit.robot.bench import platform as platform_module
-from winchkit.robot.bench.tension_trim import ForceTrim, TrimSetting
-from winchkit.robot.forces.force_distribution import null_space
+from winchkit.robot.bench.correction import Bounds, Correction
+from winchkit.robot.bench.force_loop import ForceLoop, ForceSetting
+from winchkit.robot.forces.force_distribution import ForceLimits, null_space, quadratic
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_robot, read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 
-CYCLE = 0.02
+CYCLE, DELAY = 0.02, 12
 LIMITS = LimitSpec(0.3, 1.0, response_time=0.06)
 STIFFNESS = np.linspace(2e4, 6e4, 8)
 WANTED = np.full(8, 500.0)
@@ -39,31 +40,54 @@ def structure() -> Array:
 class Cables:
     """Elastic cables of a platform that keeps its place, read with a delay."""
 
-    def __init__(self, structure: Array, force: Array, travel: float = 0.01) -> None:
+    def __init__(
+        self,
+        structure: Array,
+        force: Array,
+        travel: float = 0.01,
+        *,
+        speed: float = 0.005,
+        known: bool = False,
+        unknown: float = 0.0,
+    ) -> None:
         null = null_space(structure)
         self.force, self.first = force, force
         self.read = lambda: self.force
-        self.trips: list[str] = []
+        self.trips: list[Trip] = []
         self.balanced = null @ null.T
-        setting = TrimSetting(
-            tuple("12345678"), WANTED, self.balanced, STIFFNESS, 0.3, travel, 0.005, 12.0
+        names, limits = tuple("12345678"), [LIMITS] * 8
+        setting = ForceSetting(
+            names,
+            WANTED,
+            self.balanced,
+            STIFFNESS,
+            known,
+            delay=0.3,
+            lag=DELAY * CYCLE,
+            speed=speed,
+            acceleration=1.0,
+            unknown=np.full(8, unknown),
         )
-        self.trim = ForceTrim(
-            setting, [LIMITS] * 8, self._readings, lambda _index, words: self.trips.append(words)
+        self.loop = ForceLoop(setting, self._readings, self.trips.append)
+        self.correction = Correction(
+            Bounds(names, limits, travel, speed),
+            [self.loop],
+            lambda elapsed, _now: elapsed < 12.0,
+            self.trips.append,
         )
         for index in range(8):
-            self.trim.join(index)
+            self.correction.join(index)
         self.time = 100.0
         self._past: list[Array] = []
 
     def _readings(self, _now: float) -> Array:
         self._past.append(self.read())
-        return self._past[max(0, len(self._past) - 13)]
+        return self._past[max(0, len(self._past) - 1 - DELAY)]
 
     def step(self, stiffness: Array) -> tuple[Array, Array]:
         """A cycle; wound cable and speeds."""
         self.time += CYCLE
-        pairs = [self.trim.at(index, self.time, self.time) for index in range(8)]
+        pairs = [self.correction.at(index, self.time, self.time) for index in range(8)]
         wound, speed = np.array(pairs).T
         self.force = self.first + stiffness * wound
         return wound, speed
@@ -82,13 +106,14 @@ deviations = st.lists(st.floats(-150.0, 150.0), min_size=8, max_size=8)
 def test_balanced_forces_converge_and_the_platform_keeps_its_balance(
     structure: Array, deviation: list[float], softer: float
 ) -> None:
-    cables = Cables(structure, WANTED + np.array(deviation))
+    null = null_space(structure)
+    cables = Cables(structure, WANTED + null @ null.T @ np.array(deviation))
     begin, before = cables.missing, structure @ cables.first
     largest = begin
     for _ in range(round(13.0 / CYCLE)):
         cables.step(STIFFNESS * softer)
         largest = max(largest, cables.missing)
-    assert cables.trim.ended
+    assert cables.correction.ended
     assert not cables.trips
     assert cables.missing <= 0.02 * begin + 0.1
     assert largest <= begin * (1 + 1e-9), "it never makes it worse"
@@ -124,19 +149,87 @@ def test_a_cell_that_stands_still_trips_at_the_travel(structure: Array) -> None:
     cables.read = lambda: shown
     for _ in range(round(11.0 / CYCLE)):
         wound, _ = cables.step(STIFFNESS)
-    assert "4 mm of cable (travel of the trim)" in cables.trips[0]
+    assert cables.trips[0].kind == "correction"
+    assert "4 mm of cable (travel of the correction)" in cables.trips[0].message
     assert np.abs(wound).max() == pytest.approx(0.004, abs=5e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(index=st.integers(0, 7), jump=st.floats(140.0, 2000.0), sign=st.sampled_from([-1.0, 1.0]))
+def test_a_cell_that_jumps_trips_within_its_time_and_moves_no_cable_far(
+    structure: Array, index: int, jump: float, sign: float
+) -> None:
+    """A fifth of 500 N; three quarters of a jump contradict the weight of this platform."""
+    cables = Cables(structure, balanced_forces(structure), speed=0.05, known=True)
+    for _ in range(100):
+        cables.step(STIFFNESS)
+    wrong = sign * jump * np.eye(8)[index]
+    cables.read = lambda: cables.force + wrong
+    for _ in range(DELAY + 1):
+        assert not cables.trips, "the reading has not come yet"
+        cables.step(STIFFNESS)
+    for _ in range(round(0.1 / CYCLE)):
+        cables.step(STIFFNESS)
+    assert [trip.kind for trip in cables.trips][:1] == ["cable forces"]
+    assert cables.trips[0].latches
+    assert np.abs(cables.correction.at(0, cables.time, cables.time)[0]) < 0.01
+
+
+@settings(max_examples=20, deadline=None)
+@given(steps=st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=4), softer=st.floats(0.9, 1.0))
+def test_a_step_of_a_known_stiffness_is_fed_forward_without_overshoot(
+    structure: Array, steps: list[float], softer: float
+) -> None:
+    first = balanced_forces(structure)
+    cables = Cables(structure, first, 0.03, speed=0.05, known=True)
+    cables.loop.force = first
+    cables.step(STIFFNESS)
+    way = cables.balanced @ np.eye(8)[0]
+    for step in steps:
+        before, aim = cables.force, cables.loop.force + step * way / way[0]
+        cables.loop.aim(aim)
+        wanted = float(np.abs(aim - before).max())
+        for _ in range(round(0.3 / CYCLE)):
+            cables.step(STIFFNESS * softer)
+            beyond = (cables.force - aim) * np.sign(aim - before)
+            assert beyond.max() <= 0.02 * wanted + 1.0
+        assert np.abs(cables.force - aim).max() <= (1.0 - softer) * wanted + 0.05 * wanted + 1.0
+        for _ in range(100):
+            cables.step(STIFFNESS * softer)
+
+
+@given(size=st.floats(0.0, 60.0), share=st.floats(0.0, 0.02))
+@settings(max_examples=20, deadline=None)
+def test_deviations_that_unknown_friction_explains_are_left(
+    structure: Array, size: float, share: float
+) -> None:
+    first = balanced_forces(structure)
+    null = null_space(structure)[:, 0]
+    cables = Cables(structure, first + size * null, unknown=share)
+    cables.loop.force = first
+    for _ in range(round(13.0 / CYCLE)):
+        cables.step(STIFFNESS)
+    left = float(np.linalg.norm(cables.balanced @ (first - cables.force)))
+    # Two standard deviations of independent errors, in the two directions that are free.
+    explained = 2.0 * share * float(np.sqrt(np.diag(cables.balanced) @ cables.force**2))
+    assert left == pytest.approx(min(size, explained), rel=0.03, abs=0.2)
+
+
+def balanced_forces(structure: Array) -> Array:
+    """Forces that hold the platform, near 500 N."""
+    robot: Robot = robot_of(read_robot(find("profiles", "winding-device-8")))
+    return quadratic(structure, robot.weight(robot.home)[0], ForceLimits(60.0, 940.0)).value
 
 
 def test_a_stop_ramps_all_cables_to_rest_together(structure: Array) -> None:
     cables = Cables(structure, WANTED - cables_off())
     for _ in range(30):
         cables.step(STIFFNESS)
-    cables.trim.end()
+    cables.correction.end()
     for _ in range(3):
         _, speed = cables.step(STIFFNESS)
     assert not speed.any()
-    assert cables.trim.ended
+    assert cables.correction.ended
 
 
 def cables_off() -> Array:
@@ -170,16 +263,11 @@ def test_forces_that_the_drives_do_not_give_are_refused_before_anything_moves() 
 
 
 @pytest.mark.slow
-def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(
-    structure: Array, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        platform_module, "greatest_stiffness", lambda _cable, length, _bound: 250e3 / length
-    )
+def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(structure: Array) -> None:
     sim = read_simbench(find("sim", "winding-device-robot"))
     assert sim.bench.robot is not None
     bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
-    wiring = replace(sim.bench.robot, tension_trim=True)
+    wiring = replace(sim.bench.robot, tension_trim="end", axial_stiffness=250e3)
     sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
     clock = SimulatedClock()
     null = null_space(structure)
