@@ -138,8 +138,8 @@ def measured(
     Notes
     -----
     An output above its noise refutes the model where each run's own mean predicts it better, beyond
-    the standard error of the difference over blocks of time. At the noise a mean may predict
-    better: the noise of a measured input, such as the load, is in the error of the model. An output
+    the standard error of the difference over blocks of time, and by more than the variance of the
+    noise: that of a measured input, such as the load, is in the error of the model. An output
     that does not vary measures nothing where the model of the file says that it must vary, or where
     its noise is more than a tenth of its level.
     """
@@ -156,7 +156,7 @@ def measured(
         varied[output] += float(deviation @ deviation)
         predicted[output] += float(np.sum(_centred(own, valid) ** 2))
         means[output].append(float(np.mean(samples[valid])))
-        loss = error**2 - deviation**2
+        loss = error**2 - deviation**2 - valid * (outputs[output].noise_rms or 0.0) ** 2
         losses[output] += np.bincount(block, weights=loss, minlength=blocks.count)
     deciding, refuted = set(), set()
     for output, loss in losses.items():
