@@ -427,12 +427,12 @@ def _rounded_law(
     outputs: Mapping[str, OutputFit],
     standing: Standing,
 ) -> str:
-    """Simpler friction with a rounded reversal that explains a presliding one to a tenth, or none.
+    """Simpler law, a friction's with a rounded reversal, that explains all but a tenth, or none.
 
     How a reversal looks is a nuisance: a drive's filter rounds it as well.
     """
     effect = result.final.hypothesis.terms[index].effect
-    if not (effect.memory and effect.reduces_to):
+    if not effect.reduces_to:
         return ""
     noise, folds = result.noise, engine.folds(result.final, result.noise)
     simpler = with_rounded_reversals(

@@ -129,7 +129,8 @@ def _with_plain_laws(
     """The result with its simplest laws and fitted transitions.
 
     A law with a degenerate shape may have imitated another effect (presliding over a whole turn is
-    a spring). Where its replacement loses by 2 %, the search is repeated without such laws.
+    a spring). Where its replacement loses by 2 %, the search is repeated without such laws, for a
+    model that predicts as well as the one with them.
     """
     plain = _simplified(engine, result)
     before = (engine, result.final, result.noise)
@@ -146,7 +147,8 @@ def _with_plain_laws(
     again.on_trial = engine.on_trial
     found = _simplified(again, stepwise_selection(again))
     now, was = (again, found.final, found.noise), (engine, plain.final, plain.noise)
-    return (again, found) if predicts_better(now, was) else (engine, plain)
+    as_well = predicts_better(now, was) and not predicts_better(before, now)
+    return (again, found) if as_well else (engine, plain)
 
 
 def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
