@@ -34,7 +34,6 @@ from campaign.logger_case import LoggerPlan, make_logger_case
 from campaign.logger_case import answer as logger_answer
 from campaign.run import answer
 from diagnosis_campaign import KINDS, LOGGER_SNRS, plans
-from winchkit.diagnosis import search
 from winchkit.diagnosis.selection.weighting import Reweighted
 
 HOUSE = "winchkit.diagnosis"
@@ -70,12 +69,6 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "fitted transitions": {
         "search.with_fitted_transitions": _second,
         "diagnose.with_fitted_transitions": _second,
-    },
-    "search without degenerate laws": {
-        "search._with_plain_laws": lambda engine, result, _: (
-            engine,
-            search._simplified(engine, result),
-        )
     },
     "simplest laws": {"search.simplified": lambda _, final, noise, __: (final, noise)},
     "equal weights": {"diagnose.reweighted": lambda _, fitted, noise: Reweighted(fitted, noise)},

@@ -13,7 +13,7 @@ from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
-from winchkit.diagnosis.regression.cross_validation import excess
+from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.run_offsets import run_offsets
@@ -45,7 +45,6 @@ from winchkit.diagnosis.selection.transitions import (
 )
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.steps import (
-    CERTAIN,
     Standing,
     candidates_of,
     is_small,

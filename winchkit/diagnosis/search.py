@@ -93,7 +93,7 @@ def search(
     if reduced is not None:
         engine, result = again(reduced, "without impacts")
     engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-    return _with_plain_laws(engine, result, catalogue)
+    return engine, _simplified(engine, result)
 
 
 def _with_transitions(
@@ -121,34 +121,6 @@ def _with_transitions(
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial = trials
     return stepwise_selection(again), (again, rounded)
-
-
-def _with_plain_laws(
-    engine: TimeSeriesSelection, result: SelectionResult, catalogue: Catalogue
-) -> tuple[TimeSeriesSelection, SelectionResult]:
-    """The result with its simplest laws and fitted transitions.
-
-    A law with a degenerate shape may have imitated another effect (presliding over a whole turn is
-    a spring). Where its replacement loses by 2 %, the search is repeated without such laws, for a
-    model that predicts as well as the one with them.
-    """
-    plain = _simplified(engine, result)
-    before = (engine, result.final, result.noise)
-    left = {term.effect.id for term in plain.final.hypothesis.terms}
-    degenerate = {
-        term.effect.id
-        for term in result.final.hypothesis.terms[engine.n_initial_terms :]
-        if term.effect.reduces_to and term.effect.id not in left
-    }
-    if not degenerate or not predicts_better(before, (engine, plain.final, plain.noise)):
-        return engine, plain
-    others = [effect for effect in catalogue.of_winches() if effect.id not in degenerate]
-    again = selection_engine(engine.regression.dataset, catalogue, others)
-    again.on_trial = engine.on_trial
-    found = _simplified(again, stepwise_selection(again))
-    now, was = (again, found.final, found.noise), (engine, plain.final, plain.noise)
-    as_well = predicts_better(now, was) and not predicts_better(before, now)
-    return (again, found) if as_well else (engine, plain)
 
 
 def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:

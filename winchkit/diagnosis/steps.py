@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
-from winchkit.diagnosis.regression.cross_validation import excess, held_out
+from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
@@ -28,9 +28,6 @@ from winchkit.diagnosis.verdict.curve_fits import Curve
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible
 
-CERTAIN = 0.1
-"""Share of what a step explains that may be left unexplained in its outputs where it is certain:
-the tenth of the verdict ``explained``."""
 _MOST_ALTERNATIVES = 3
 """Members of a set, the simplest first; more are named in a doubt. Rule of thumb: what a reader can
 compare."""

@@ -35,6 +35,9 @@ _MOST_EXACT = 50
 approximation is within 10⁻³ of it."""
 AT_NOISE = 1.1
 """Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
+CERTAIN = 0.1
+"""Share of what a step explains that may be left unexplained in its outputs where it is certain:
+the tenth of the verdict ``explained``."""
 _RIDGE = 1e-12
 """Ridge on scaled normal equations of an extrapolation; numerical."""
 

@@ -1,9 +1,9 @@
 """Simplification of a selected model: nested laws, and steps without which nothing is lost.
 
 A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs is
-that of a simpler effect (``Effect.reduces_to``), which takes its place; so it does where the
-refitted model with it predicts every output as well, to 2 %. A step is left out where the model
-without it does.
+that of a simpler effect (``Effect.reduces_to``), which takes its place where it explains nine
+tenths as much; so it does where the refitted model with it predicts every output as well, to 2 %. A
+step is left out where the model without it does.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
@@ -52,12 +52,25 @@ def _with_simpler_laws(
         simpler = settled(with_simpler_law(engine, present, noise, index))
         spread = spread_of(engine.regression, present, noise, engine.regression.blocks, index)
         values = estimates(engine.regression, present, spread)[index][1]
-        if (
+        if _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO or (
             reduced_law(term, values, engine.profile)
-            or _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
+            and _lost_share(engine, simpler, present, noise, index) <= CERTAIN
         ):
             present = simpler
     return present
+
+
+def _lost_share(
+    engine: SelectionEngine, simpler: Fit, present: Fit, noise: Noise, index: int
+) -> float:
+    """Share of the excess that a term explains, which a model with a simpler law leaves."""
+    without = engine.refit(present.hypothesis.without(index), noise)
+    folds = engine.folds(present, noise)
+    left, now, whole = (
+        excess(held_out_rms(engine.regression, fitted, noise, folds), noise.rms)
+        for fitted in (simpler, present, without)
+    )
+    return (left - now) / (whole - now) if whole > now else 0.0
 
 
 def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> float:
