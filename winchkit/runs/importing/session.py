@@ -238,25 +238,33 @@ def runs_of(
     loads = masses or [None] * len(parts)
     identity = mapping_id(mapping or mapping_from(guesses))
     if not is_joined:
-        faults: list[Fault] = []
-        runs: list[tuple[int, Run]] = []
-        jumps: list[Fault] = []
-        for index, part in enumerate(parts):
-            own = _metadata([guesses[index]], identity, loads[index])
-            try:
-                found, torn = _pieces(part, own)
-                runs, jumps = [*runs, *((index, run) for run in found)], [*jumps, *torn]
-            except RunError as error:
-                faults += error.faults
-        if faults:
-            raise RunError(faults)
-        return Imported(tuple(runs), (), tuple(jumps))
+        return _alone(guesses, parts, identity, loads)
     order = [*angles[:1], *(index for index in range(len(parts)) if index not in angles[:1])]
     whole, joints = joined([parts[index] for index in order], lag)
     texts = _metadata([guesses[index] for index in order], identity, loads[order[0]])
     texts["joined"] = "; ".join(joint.text.replace(":", " ") for joint in joints)
     found, torn = _pieces(whole, texts)
     return Imported(tuple((order[0], run) for run in found), joints, tuple(torn))
+
+
+def _alone(
+    guesses: Sequence[Guess], parts: Sequence[Streams], identity: str, loads: Sequence[str | None]
+) -> Imported:
+    """Runs of files of which none is joined to another; all faults of all files at once."""
+    faults: list[Fault] = []
+    runs: list[tuple[int, Run]] = []
+    jumps: list[Fault] = []
+    for index, part in enumerate(parts):
+        try:
+            found, torn = _pieces(part, _metadata([guesses[index]], identity, loads[index]))
+        except RunError as error:
+            faults += error.faults
+            continue
+        runs += [(index, run) for run in found]
+        jumps += torn
+    if faults:
+        raise RunError(faults)
+    return Imported(tuple(runs), (), tuple(jumps))
 
 
 def _metadata(guesses: Sequence[Guess], identity: str, mass: str | None) -> dict[str, str]:

@@ -158,7 +158,7 @@ def test_a_gap_of_a_counter_that_wraps_cuts_a_run(tmp_path: Path) -> None:
 def test_a_counter_that_wraps_in_a_gap_alone_cuts_a_run(tmp_path: Path) -> None:
     """No other step says that it wraps: its rate over the gap is that of no motion."""
     time = np.delete(np.arange(400) / 100, slice(195, 206))
-    counts = np.mod(45_536 + 10_000 * time + 50 * np.sin(9 * time), 65_536)
+    counts = np.mod(20_000 + 22_768 * time + 50 * np.sin(9 * time), 65_536)
     path = log(tmp_path / "a.csv", "position [counts]", np.round(counts), time)
     code, output = command(path, "-o", tmp_path / "runs", "-y", "--counts-per-turn", "4096")
     assert code == 0
