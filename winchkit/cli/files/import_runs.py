@@ -79,8 +79,6 @@ def write_runs(
     for (_, run), target in zip(results, targets, strict=True):
         write_run(run, target)
         summary = summary_of(run)
-        if not is_json():
-            click.echo(str(target))
         entries.append(
             {
                 "path": target,
@@ -96,4 +94,6 @@ def write_runs(
         click.echo(line, err=True)
     for line in together((str(entry["path"]), entry["summary"].text) for entry in entries):
         note(line)
+    for target in () if is_json() else targets:
+        click.echo(str(target))
     return entries
