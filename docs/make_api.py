@@ -30,7 +30,7 @@ SECTIONS = {
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
     ),
     "Runs": (
-        *("read_run", "write_run", "open_writer", "Run", "run_of", "export"),
+        *("read_run", "import_runs", "write_run", "open_writer", "Run", "run_of", "export"),
         *("read_log", "info_of", "recover", "open_replay"),
         *("decode_trace", "DecodedTrace"),
     ),

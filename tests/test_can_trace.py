@@ -108,7 +108,8 @@ BY_HAND = {
     "IXXAT": "ASCII Trace IXXAT MiniMon\nDate: 1.2.2025\nBaudrate: 500 kbit/s\n"
     '"Time";"Identifier (hex)";"Format";"Flags";"Data (hex)"\n'
     '"01:00:00.25";"181";"Std";"";"37 06 FF "\n"01:00:00.50";"80";"Std";"";""\n'
-    '"01:00:00.75";"702";"Std";"Rtr ";"Remote request  DLC = 1 "\n"01:00:01.00";"5FF";"Std";"";"01 "\n',
+    '"01:00:00.75";"702";"Std";"Rtr ";"Remote request  DLC = 1 "\n'
+    '"01:00:01.00";"5FF";"Std";"";"01 "\n',
     "CSV with units": "Time [ms];Channel;CAN ID;DLC;Data\n250;1;0x181;3;37 06 FF\n500;1;0x80;0;\n"
     "1000;1;0x5FF;1;01\n",
     "CSV with decimal identifiers": "time (s),id,data\n0.25,385,3706FF\n0.5,128,\n1.0,1535,01\n",

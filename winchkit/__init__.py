@@ -84,6 +84,7 @@ if TYPE_CHECKING:
     from winchkit.profile_edit.naming import extended_name
     from winchkit.profile_edit.new_profile import new_profile
     from winchkit.runs.export import export
+    from winchkit.runs.importing.session import import_runs
     from winchkit.runs.info import info_of
     from winchkit.runs.read import read_log, read_run
     from winchkit.runs.recover import recover
@@ -157,6 +158,7 @@ __all__ = [
     "fit_cell",
     "forward",
     "identify_dahl",
+    "import_runs",
     "info_of",
     "ladder",
     "listed_benches",
@@ -267,6 +269,7 @@ _NAMES = {
     "winchkit.profile_edit.naming": ("extended_name",),
     "winchkit.profile_edit.new_profile": ("new_profile",),
     "winchkit.runs.export": ("export",),
+    "winchkit.runs.importing.session": ("import_runs",),
     "winchkit.runs.info": ("info_of",),
     "winchkit.runs.read": ("read_log", "read_run"),
     "winchkit.runs.recover": ("recover",),

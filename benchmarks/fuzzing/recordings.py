@@ -202,7 +202,9 @@ class _Writer:
             self.moduli[channel] = modulus * si
         elif base in {"torque", "velocity"} and self.chance(0.1, f"lost sign of {channel}"):
             scale = 10.0**decimals
-            if float(np.max(np.abs(values))) * scale < 32000:
+            # Numbers that are all negative say nothing of a lost sign.
+            is_both = bool(np.any(values < 0) and np.any(values > 0))
+            if is_both and float(np.max(np.abs(values))) * scale < 32000:
                 values = np.where(values < 0, values + 65536 / scale, values)
         return unit, [f"{value:.{decimals}f}" for value in values]
 

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from winchkit.cli import main
 from winchkit.diagnosis.add import fitted_addition
 from winchkit.diagnosis.compare import compared
+from winchkit.diagnosis.data.requirements import missing_needs
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
+from winchkit.effects.catalogue import load_catalogue
 from winchkit.errors import FileError, RunError
 from winchkit.report.pages.pages import addition_html, comparison_html, report_html
 from winchkit.report.text import report_text
@@ -96,6 +98,9 @@ def test_the_diagnosis_is_that_of_a_rotary_axis_in_other_units(folder: Path) -> 
     assert not OF_TURNS.findall(text)
     assert "force" in own.diagnosis.outputs
     assert own.diagnosis.outputs["force"].unit == "N"
+    gravity = load_catalogue()["joint-gravity"]
+    assert missing_needs(gravity, own.engine.regression.dataset)
+    assert not missing_needs(gravity, other.engine.regression.dataset)
     assert not OF_TURNS.findall(json.dumps(own.diagnosis.to_json()))
     page = re.sub(
         r"<style.*?</style>|<script.*?</script>", "", report_html(own, "page"), flags=re.S

@@ -31,7 +31,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "cable_force": "a load, load_mass or tension",
     "gearing": "a [gearbox] with another ratio than 1",
     "robot": "a robot's profile",
-    "axis": "a profile of kind 'axis', or runs without any force in a cable",
+    "axis": "a profile of kind 'axis' that turns, or runs without any force in a cable",
     "ungeared": "a profile of kind 'axis', or a winch without a gearbox",
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",

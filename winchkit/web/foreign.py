@@ -3,27 +3,17 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from winchkit.errors import FileError, UsageError
+from winchkit.errors import FileError, RunError, UsageError
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import decimated
-from winchkit.runs.importing.answers import (
-    CONSTANTS,
-    STORAGE,
-    Answers,
-    read_column,
-    read_constant,
-    with_options,
-)
+from winchkit.runs.importing.answers import CONSTANTS, STORAGE, read_answers
 from winchkit.runs.importing.formats.source import read_table
-from winchkit.runs.importing.guess import guess_columns
-from winchkit.runs.importing.mapping import mapping_id, mapping_of
-from winchkit.runs.importing.runs import metadata_of, whole_run
-from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.importing.session import guesses_of, runs_of
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.mapping import CHANNELS
@@ -50,7 +40,7 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
     and ``options`` of the command line that answer a question (``--signed "torque"``). Raises
     FileError where no reader knows the file.
     """
-    guess = guess_columns(read_table(path), _answers(answers or {}))
+    (guess,) = guesses_of([read_table(path)], read_answers(answers or {}))
     columns = {column.source: column for column in guess.table.columns}
     rows = []
     for item in guess.assignments:
@@ -96,14 +86,15 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
     ``answers``: as for :func:`preview`; ``load_mass`` besides. Raises UsageError where something is
     still not known; RunError with every fault of the file.
     """
-    guess = guess_columns(read_table(path), _answers(answers))
+    (guess,) = guesses_of([read_table(path)], read_answers(answers))
     if guess.questions:
         raise UsageError("; ".join(question.text for question in guess.questions))
-    mapping = mapping_of("mapping", [(path.stem, guess)])
-    metadata = metadata_of(guess, {"imported_mapping": mapping_id(mapping)})
-    if mass := str(answers.get("load_mass", "")).strip():
-        metadata["load_mass"] = f"{parse(mass, 'mass'):.12g} kg"
-    return replace(whole_run(streams_of(guess), metadata), name=path.stem)
+    mass = str(answers.get("load_mass", "")).strip()
+    found = runs_of([guess], masses=[f"{parse(mass, 'mass'):.12g} kg" if mass else None])
+    if found.jumps:
+        by = "; they are written by winchkit import"
+        raise RunError([replace(jump, message=jump.message + by) for jump in found.jumps])
+    return replace(found.runs[0][1], name=path.stem)
 
 
 def import_command(file: str, answers: Mapping[str, Any], folder: str) -> str:
@@ -118,19 +109,3 @@ def import_command(file: str, answers: Mapping[str, Any], folder: str) -> str:
         if text := str(answers.get(key, "")).strip():
             words += [f"--{key.replace('_', '-')}", text]
     return " ".join([shlex.join(words), *map(str, answers.get("options", ()))])
-
-
-def _answers(given: Mapping[str, Any]) -> Answers:
-    columns: Sequence[str] = given.get("columns", ())
-    answers = Answers(columns=tuple(read_column(str(text)) for text in columns))
-    values = {
-        key: read_constant(key, str(given[key]))
-        for key in CONSTANTS
-        if str(given.get(key, "")).strip()
-    }
-    stored = with_options(answers, map(str, given.get("options", ())))
-    return _with(stored, **values)
-
-
-def _with(answers: Answers, **constants: Any) -> Answers:
-    return replace(answers, **constants)

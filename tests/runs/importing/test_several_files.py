@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from winchkit import import_runs
 from winchkit.arrays import Array
 from winchkit.cli import main
-from winchkit.errors import RunError
+from winchkit.errors import RunError, UsageError
 from winchkit.runs import read_run
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
@@ -87,8 +88,12 @@ def test_units_of_a_sum_are_converted_and_must_be_of_one_kind(tmp_path: Path) ->
     path = write(tmp_path / "a.csv", head, TIME, ANGLE, np.sin(TIME), 100 * np.cos(TIME), TIME)
     run = imported(path, "motor_torque=a-b")
     assert run["motor_torque"] == pytest.approx(np.sin(TIME) - 0.1 * np.cos(TIME), abs=1e-6)
-    guess = guess_columns(read_table(path), Answers((read_column("motor_torque=a-c"),)))
-    assert "there is no column 'a-c'" in guess.questions[0].text
+    for expression, told in (
+        ("a-c", "or convertible ones: 'a' [N m], 'c' [N]"),
+        ("a-d*2", "there is no column 'd' for 'a-d*2.0'"),
+    ):
+        answers = Answers((read_column(f"motor_torque={expression}"),))
+        assert told in guess_columns(read_table(path), answers).questions[0].text
 
 
 def test_a_name_with_a_minus_is_that_column(tmp_path: Path) -> None:
@@ -116,14 +121,48 @@ def test_a_clock_that_is_set_back_is_refused(back: float, tmp_path: Path) -> Non
         imported(path)
 
 
-def test_sixteen_files_of_one_kind_are_one_table(tmp_path: Path) -> None:
-    paths = [
-        write(tmp_path / f"run{n:02}.csv", "time [s],q [deg],tau [N m]", TIME, ANGLE + n, ANGLE)
-        for n in range(16)
-    ]
+@pytest.mark.parametrize("is_uneven", [False, True])
+def test_sixteen_files_of_one_kind_are_one_table(is_uneven: bool, tmp_path: Path) -> None:
+    paths = []
+    for n in range(16):
+        # Every file with a length, a number of wraps, missing numbers and a row of its own.
+        size = len(TIME) - n * is_uneven
+        time, angle = TIME[:size].copy(), (1 + n * is_uneven) * ANGLE[:size] + n
+        time[40 + n] -= 0.07 * is_uneven
+        torque = np.where(np.arange(size) < n * is_uneven, np.nan, angle)
+        path = tmp_path / f"run{n:02}.csv"
+        paths.append(write(path, "time [s],q [deg],tau [N m]", time, np.mod(angle, 360), torque))
     code, output = command(*paths, "-o", tmp_path / "runs", "-y")
     assert code == 0
     assert output.count("motor_angle  ") == 1
-    assert len(output.splitlines()) <= 42
+    assert len(output.splitlines()) <= 40
     _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, 5 * ANGLE, TIME) for p in paths])
     assert shown.count("? 'q'") == 1
+
+
+def test_a_linear_axis_whose_force_is_in_a_file_of_its_own(tmp_path: Path) -> None:
+    motion = write(tmp_path / "m.csv", "time [s],pos [mm],velocity [m/s]", TIME, ANGLE, TIME)
+    force = write(tmp_path / "f.csv", "time [s],Kraft [kN]", TIME, TIME)
+    code, _ = command(motion, force, "--join", "--lag", "0 s", "-o", tmp_path / "runs", "-y")
+    assert code == 0
+    run = read_run(tmp_path / "runs" / "m.csv")
+    assert set(run) == {"position", "velocity", "force"}
+    assert run["position"] == pytest.approx(ANGLE / 1000, abs=1e-8)
+
+
+def test_the_runs_of_the_command_in_python(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "time [s],q [deg],tau [%]", TIME, ANGLE, TIME)
+    with pytest.raises(UsageError, match="--rated-torque"):
+        import_runs(path)
+    (run,) = import_runs(path, rated_torque="2 N m", columns=["motor_angle=-q"], load_mass="3 kg")
+    folder = tmp_path / "runs"
+    command(path, "--rated-torque", "2 N m", "-c", "motor_angle=-q", "-o", folder, "-y")
+    (again,) = import_runs(path, mapping=folder / "mapping.toml")
+    for name in run:
+        assert np.array_equal(run[name], again[name])
+        assert np.array_equal(run[name], read_run(folder / "a.csv")[name])
+    with pytest.raises(UsageError, match="has no rated"):
+        import_runs(path, rated="2 N m")
+    assert run["motor_torque"] == pytest.approx(0.02 * TIME)
+    assert run["motor_angle"] == pytest.approx(-np.radians(ANGLE), abs=1e-7)
+    assert run.metadata["load_mass"] == "3 kg"

@@ -154,14 +154,10 @@ def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[i
         name, written = name.strip().lower(), written.strip(" ]")
         key = "indicated" if name == "reading" else name
         if key not in _COLUMNS:
-            raise FileError(
-                Fault(
-                    f"unknown column '{key}'; known are {', '.join(_COLUMNS)}"
-                    f"{suggest(key, list(_COLUMNS))}",
-                    path,
-                    line,
-                )
-            )
+            shape = "; the first line names them, e.g. load [kg],reading [counts], and each other "
+            text = f"unknown column '{key}'; known are {', '.join(_COLUMNS)}"
+            text += suggest(key, list(_COLUMNS)) or f"{shape}line is one reading"
+            raise FileError(Fault(text, path, line))
         factor = 1.0
         if key in ("load", "indicated", "std"):
             known = read_unit(written)

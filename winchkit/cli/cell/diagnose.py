@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 import click
@@ -16,7 +17,7 @@ from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.options import TABLE, bench_by_default
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
-from winchkit.errors import one_line
+from winchkit.errors import UsageError, one_line
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
@@ -92,6 +93,8 @@ def command(
         return
     if column is not None:
         raise click.UsageError("'--column' is a column of '--run FILE'.")
+    if cell is not None and Path(cell).is_file():
+        raise UsageError(f"'{cell}' is a file, not a cell of a bench: --run '{cell}' examines it")
     bench = bench_by_default(context, _parameter(context, "bench"), bench)
     assert bench is not None, "else UsageError"
     from winchkit.bench.cells.calls import samples_of_readings

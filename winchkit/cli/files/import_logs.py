@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,35 +16,16 @@ from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity, naming
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
-from winchkit.cli.files.import_runs import (
-    RunMetadata,
-    identity,
-    inspected,
-    runs_of,
-    targets_in,
-    targets_of,
-    write_runs,
-)
-from winchkit.cli.files.import_table import shortened
-from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
+from winchkit.cli.files.import_runs import inspected, targets_in, targets_of, write_runs
+from winchkit.cli.files.import_table import together
+from winchkit.errors import Fault, FileError, RunError, UsageError
 
 if TYPE_CHECKING:
-    from winchkit.runs.importing.answers import Answers
     from winchkit.runs.importing.assignment import Guess
     from winchkit.runs.importing.table import Table
     from winchkit.schema.mapping import ImportMapping
 
 _MAPPING = "mapping.toml"
-_CELL_ALONE = (
-    "no column is the motor angle or velocity: a run of a load cell alone, for `winchkit cell "
-    "diagnose --run`; import the file together with the one that has the angle, or name it by "
-    '--column "motor_angle=COLUMN [deg]", for a run of a winch'
-)
-_ANGLES = {"motor_angle", "position"}
-_NO_ANGLE = (
-    "no column is the motor angle or velocity, without which there is no run: name it by --column "
-    '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
-)
 
 
 class _Written(Quantity):
@@ -201,11 +181,16 @@ def command(
     that has it, by its time stamps or by cross-correlation (docs/howto/logger.md).
     """
     from winchkit.cli.files.import_table import alike, entry_of, tables_text
-    from winchkit.runs.importing.streams import streams_of
+    from winchkit.runs.importing.answers import read_answers
+    from winchkit.runs.importing.mapping import mapping_id
+    from winchkit.runs.importing.session import guesses_of, mapping_from, runs_of
+    from winchkit.schema.read import read_mapping
 
     masses = _masses(load_masses, len(files))
     tables = _tables(files, devices)
-    guesses, declared = _guesses(tables, mapping, _answers(options), asking=_may_ask(yes))
+    declared = None if mapping is None else read_mapping(mapping)
+    ask = asked if _may_ask(yes) else None
+    guesses = guesses_of(tables, read_answers(options), declared, ask)
     is_new = declared is None
     report: dict[str, Any] = {
         "schema": 1,
@@ -220,7 +205,8 @@ def command(
     if is_new and not is_json() and (output is None or not is_quiet()):
         click.echo(shown, err=output is not None)
     elif is_new and not is_json():
-        _warn(guesses)
+        notes = [(g.table.path, note) for g in guesses for note in (*g.table.notes, *g.notes)]
+        _tell((path, f"{text} (warning)") for path, text in notes)
     if output is None:
         if is_json():
             echo_json(report)
@@ -230,27 +216,19 @@ def command(
         if is_json():
             echo_json(report)
         raise UsageError(_unanswered(guesses))
-    mapping_file = declared or _mapping_of(files, guesses)
+    mapping_file = declared or mapping_from(guesses)
     targets = targets_in(files, Path(output), overwrite=overwrite, is_joined=join)
     with progress_bar() as progress:
         progress("converting", None)
-        results, joints = runs_of(
-            files,
-            [streams_of(guess) for guess in guesses],
-            RunMetadata(guesses, mapping_file, masses),
-            is_joined=join,
-            lag=_lag(lag),
-        )
-        report["joints"], report["mapping_id"] = joints, identity(mapping_file)
+        found = runs_of(guesses, mapping_file, masses=masses, join=join, lag=_lag(lag))
+        results, joints = found.runs, found.joints
+        report["joints"], report["mapping_id"] = joints, mapping_id(mapping_file)
         targets = targets_of(results, targets, overwrite=overwrite)
         report["sanity"] = inspected([run for _, run in results])
+    _tell((jump.path, f"{jump.message} (warning)") for jump in found.jumps)
     for joint in joints:
         note(f"{joint.path}: {joint.text}")
-    told: dict[str, list[str]] = {}
-    for finding in report["sanity"]:
-        told.setdefault(f"{finding['channel']}: {finding['text']}", []).append(finding["run"])
-    for text, names in told.items():
-        click.echo(f"{shortened(list(dict.fromkeys(names)))}: {text}", err=True)
+    _tell((item["run"], f"{item['channel']}: {item['text']}") for item in report["sanity"])
     report["runs"] = write_runs(results, targets, Path(output))
     if is_new or save_mapping:
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
@@ -259,55 +237,15 @@ def command(
     suggest_next("check", [str(entry["path"]) for entry in report["runs"]])
 
 
-def _warn(guesses: Sequence[Guess]) -> None:
-    """Notes on what was read, without the table; what several files have, once."""
-    found: dict[str, list[str]] = {}
-    for guess in guesses:
-        for text in (*guess.table.notes, *guess.notes):
-            found.setdefault(text, []).append(one_line(guess.table.path))
-    for text, paths in found.items():
-        click.echo(f"{shortened(paths)}: {text} (warning)", err=True)
+def _tell(pairs: Iterable[tuple[str, str]]) -> None:
+    """Texts on files, each different one once."""
+    for line in together(pairs):
+        click.echo(line, err=True)
 
 
 def _may_ask(yes: bool) -> bool:
     """Whether somebody can answer: a terminal, and no request for silence."""
     return not yes and not is_json() and sys.stdin.isatty() and sys.stderr.isatty()
-
-
-def _answers(options: Mapping[str, Any]) -> Answers:
-    """Answers of the command line in SI; raises UsageError."""
-    from winchkit.runs.importing.answers import (
-        CONSTANTS,
-        Answers,
-        read_column,
-        read_constant,
-        read_modulo,
-    )
-
-    constants: dict[str, Any] = {
-        key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
-    }
-    try:
-        columns = tuple(read_column(text) for text in options["columns"])
-    except UsageError as error:
-        raise UsageError(f"--column: {error}") from None
-    pairs = [(item.channel, item.source, item.file) for item in columns if item.source]
-    for pair in dict.fromkeys(pairs):
-        channel, source, _ = pair
-        if pairs.count(pair) > 1:
-            raise UsageError(f"--column: {channel}={source} is given twice; give it once")
-    own = Answers(
-        columns=columns,
-        body=options["body"],
-        orientation=options["orientation"] or "",
-        axis=options["axis"],
-        motion=options["motion"] or "",
-        kind=options["kind"] or "",
-        unsigned=tuple(options["unsigned"]),
-        signed=tuple(options["signed"]),
-        modulo=tuple(map(read_modulo, options["modulo"])),
-    )
-    return replace(own, **constants)
 
 
 def _masses(texts: Sequence[str], count: int) -> list[str | None]:
@@ -353,129 +291,37 @@ def _tables(files: Sequence[str], devices: Sequence[str]) -> list[Table]:
     return tables
 
 
-def _guesses(
-    tables: Sequence[Table], mapping: str | None, answers: Answers, *, asking: bool
-) -> tuple[list[Guess], ImportMapping | None]:
-    """Assignments of every file; all faults of all files at once."""
-    from winchkit.runs.importing.answers import answers_of
-    from winchkit.runs.importing.guess import guess_columns
-    from winchkit.runs.importing.mapping import guess_by
-    from winchkit.schema.read import read_mapping
-
-    declared = None if mapping is None else read_mapping(mapping)
-    faults: list[Fault] = []
-    timed = [] if declared else _with_own_times(tables, answers)
-    guesses = []
-    for table in tables:
-        own = answers_of(table, tables, answers)
-        own = replace(own, sample_rate=None) if any(t is table for t in timed) else own
-        try:
-            guess = guess_by(table, declared) if declared else guess_columns(table, own)
-        except FileError as error:
-            faults += error.faults
-            continue
-        if asking and declared is None:
-            guess, told = asked(guess, own)
-            columns = (*answers.columns, *told.columns[len(own.columns) :])
-            rate = told.sample_rate or answers.sample_rate
-            answers = replace(told, columns=columns, sample_rate=rate)
-        guesses.append(guess)
-    if faults:
-        raise RunError(faults)
-    if declared is None and not answers.motion and _have(guesses, {"motor_angle"}):
-        # A length and a force beside a file with the motor angle are those of its cable.
-        rotary = replace(answers, motion="rotary")
-        guesses = [
-            guess_columns(guess.file, answers_of(guess.file, tables, rotary))
-            if _have([guess], {"position"})
-            else guess
-            for guess in guesses
-        ]
-    named = {
-        "--unsigned": answers.unsigned,
-        "--signed": answers.signed,
-        "--modulo": [name for name, _ in answers.modulo],
-    }
-    for option, name in [(option, name) for option, names in named.items() for name in names]:
-        if not any(guess.file.column(name) for guess in guesses):
-            has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
-            raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
-    if declared is None and _lack_angle(guesses):
-        text = _CELL_ALONE if _have(guesses, {"tension", "load"}) else _NO_ANGLE
-        guesses = [replace(guess, notes=(*guess.notes, text)) for guess in guesses]
-    return guesses, declared
-
-
-def _with_own_times(tables: Sequence[Table], answers: Answers) -> list[Table]:
-    """Files with times beside others that have none, of which a sample rate is."""
-    from winchkit.runs.importing.answers import answers_of
-    from winchkit.runs.importing.guess import guess_columns
-
-    if not answers.sample_rate or len(tables) < 2:
-        return []
-    without_rate = replace(answers, sample_rate=None)
-    own = [guess_columns(table, answers_of(table, tables, without_rate)) for table in tables]
-    timed = [table for table, guess in zip(tables, own, strict=True) if _have([guess], {"time"})]
-    return timed if len(timed) < len(tables) else []
-
-
 def _is_accepted(guesses: Sequence[Guess], yes: bool) -> bool:
-    if yes or (all(guess.is_certain for guess in guesses) and not _are_integrated(guesses)):
+    from winchkit.runs.importing.session import are_integrated
+
+    if yes or (all(guess.is_certain for guess in guesses) and not are_integrated(guesses)):
         return True
     if not _may_ask(yes):
         return False
     return click.confirm("Import as shown?", default=True, abort=True, err=True)
 
 
-def _are_integrated(guesses: Sequence[Guess]) -> bool:
-    """Whether the motor angle is the integral of a velocity: no file has an angle."""
-    return _have(guesses, {"motor_velocity", "velocity"}) and not _have(guesses, _ANGLES)
-
-
-def _lack_angle(guesses: Sequence[Guess]) -> bool:
-    """Whether channels of a run were found in the files, and none that may be the motor angle."""
-    needed = (*_ANGLES, "motor_velocity", "velocity")
-    asked = " ".join(o for guess in guesses for q in guess.questions for o in q.options)
-    is_found = any(item.channel not in {"", "time"} for guess in guesses for item in guess.used)
-    is_body = "--body" in asked
-    is_asked = any(f"{name}=" in asked for name in needed)
-    return (is_found or is_body) and not is_asked and not _have(guesses, set(needed))
-
-
-def _have(guesses: Sequence[Guess], channels: set[str]) -> bool:
-    """Whether a file has one of some channels."""
-    return any(
-        item.channel.rpartition(".")[2] in channels for guess in guesses for item in guess.used
-    )
-
-
 def _unanswered(guesses: Sequence[Guess]) -> str:
     """Message on what is not known, with the options that answer; what several files ask, once."""
-    asking: dict[str, list[str]] = {}
+    from winchkit.runs.importing.session import NO_ANGLE, are_integrated
+
+    asking: list[tuple[str, str]] = []
     for guess in guesses:
         texts = [f"{q.text}: {' or '.join(q.options)}" for q in guess.questions] or [
             f"'{item.source}' as {item.channel} [{item.unit}] is {item.confidence} ({item.reason})"
             for item in guess.used
             if item.confidence in {"derived", "assumed"}
         ]
-        for text in texts:
-            asking.setdefault(text, []).append(one_line(guess.table.path))
-    lines = [f"  {shortened(paths)}: {text}" for text, paths in asking.items()]
-    if any(_NO_ANGLE in guess.notes for guess in guesses):
-        lines.append(f"  {_NO_ANGLE}")
+        asking += [(guess.table.path, text) for text in texts]
+    lines = [f"  {line}" for line in together(asking)]
+    if any(NO_ANGLE in guess.notes for guess in guesses):
+        lines.append(f"  {NO_ANGLE}")
     if any(guess.questions for guess in guesses):
         return "\n".join(["not known, and no terminal to ask; give", *lines])
-    if _are_integrated(guesses):
+    if are_integrated(guesses):
         lines.append("  no column has the motor angle: it is the integral of motor_velocity from 0")
     accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
     return "\n".join([accept, *lines])
-
-
-def _mapping_of(files: Sequence[str], guesses: Sequence[Guess]) -> ImportMapping:
-    from winchkit.runs.importing.mapping import mapping_of
-
-    pairs = [(Path(file).stem, guess) for file, guess in zip(files, guesses, strict=True)]
-    return mapping_of("mapping", pairs)
 
 
 def _saved(mapping: ImportMapping, path: str) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from winchkit.runs.importing.assignment import Assignment, Guess
     from winchkit.runs.importing.table import Column
@@ -18,6 +19,9 @@ _PLOT = 16
 """Characters of a plot: enough for the shape of a motion."""
 _FIRST = 3
 """Values of a column that are shown: enough to see its unit and first step."""
+_MOST = 4
+"""Different texts of one kind from which those that differ in numbers alone are one line."""
+_NUMBER = re.compile(r"\d[\d.e+-]*")
 _HEAD = ("column", "channel", "unit", "SI of 1", "confidence", "first values", "plot", "reason")
 
 
@@ -28,13 +32,33 @@ def shortened(paths: Sequence[str]) -> str:
     return f"{len(paths)} files, {paths[0]} to {paths[-1]}"
 
 
+def together(pairs: Iterable[tuple[str, str]]) -> list[str]:
+    """A line for each different text, with its files; one for texts that differ in numbers alone.
+
+    ``pairs``: file and text. Texts that differ in numbers are put together where there are many.
+    """
+    told = list(dict.fromkeys((one_line(path), text) for path, text in pairs))
+    is_many = len({text for _, text in told}) > _MOST
+    found: dict[str, list[tuple[str, str]]] = {}
+    for path, text in told:
+        found.setdefault(_NUMBER.sub("#", text) if is_many else text, []).append((path, text))
+    lines = []
+    for own in found.values():
+        example = " (the numbers of the first)" if len({text for _, text in own}) > 1 else ""
+        paths = shortened(list(dict.fromkeys(path for path, _ in own)))
+        lines.append(f"{paths}: {own[0][1]}{example}")
+    return lines
+
+
 def alike(guesses: Sequence[Guess]) -> list[list[Guess]]:
-    """Guesses in groups of equal columns, units, notes and questions, in the order of the files."""
+    """Guesses in groups of equal columns, channels and units, in the order of the files."""
     found: dict[Any, list[Guess]] = {}
     for guess in guesses:
-        notes = (*guess.table.notes, *guess.notes)
-        constants = tuple(guess.table.constants.items())
-        key = guess.table.layout, guess.assignments, guess.questions, notes, constants
+        columns = tuple(
+            (item.source, item.channel, item.unit, item.factor, item.offset, item.confidence)
+            for item in guess.assignments
+        )
+        key = guess.table.layout, columns, tuple(guess.table.constants.items())
         found.setdefault(key, []).append(guess)
     return list(found.values())
 
@@ -58,11 +82,15 @@ def tables_text(group: Sequence[Guess]) -> str:
     body = aligned(lines, words=len(_HEAD))
     constants = ", ".join(f"{one_line(k)} = {v:g}" for k, v in table.constants.items())
     notes = [f"  constants: {constants}"] if constants else []
-    notes += [f"  note: {note}" for note in (*table.notes, *guess.notes)]
+    told = [(one.table.path, note) for one in group for note in (*one.table.notes, *one.notes)]
     asked = [
-        f"  ? {question.text}: {' or '.join(question.options)}" for question in guess.questions
+        (one.table.path, f"{question.text}: {' or '.join(question.options)}")
+        for one in group
+        for question in one.questions
     ]
-    return "\n".join([title, *body, *notes, *asked])
+    for mark, pairs in (("note:", told), ("?", asked)):
+        notes += [f"  {mark} {line.removeprefix(f'{names}: ')}" for line in together(pairs)]
+    return "\n".join([title, *body, *notes])
 
 
 def _row(item: Assignment, column: Column) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "cable_force": cable_force,
         "gearing": profile.gearbox.ratio != 1,
         "robot": False,
-        "axis": is_axis or is_joint,
+        "axis": (is_axis or is_joint) and not profile.is_linear,
         "ungeared": is_axis or profile.gearbox.ratio == 1,
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -159,6 +159,34 @@ class Answers:
     columns say it."""
     modulo: tuple[tuple[str, float], ...] = ()
     """Columns with the number at which they wrap; 0 for one that does not."""
+
+
+def read_answers(given: Mapping[str, Any]) -> Answers:
+    """Answers as a user writes them, in SI.
+
+    ``given``: fields of :class:`Answers` and ``columns`` as texts of the command line, and
+    ``options`` that answer a question (``--signed "torque"``); what is empty is not given. Raises
+    UsageError for a text that is wrong, and for a column that is given twice.
+    """
+    try:
+        columns = tuple(read_column(str(text)) for text in given.get("columns") or ())
+    except UsageError as error:
+        raise UsageError(f"--column: {error}") from None
+    pairs = [(item.channel, item.source, item.file) for item in columns if item.source]
+    for channel, source, file in pairs:
+        if pairs.count((channel, source, file)) > 1:
+            raise UsageError(f"--column: {channel}={source} is given twice; give it once")
+    fields: dict[str, Any] = {key: given.get(key) for key in ("body", "axis")}
+    fields |= {key: given.get(key) or "" for key in ("orientation", "motion", "kind")}
+    fields |= {key: tuple(given.get(key) or ()) for key in ("unsigned", "signed")}
+    fields |= {
+        key: read_constant(key, str(given[key]))
+        for key in CONSTANTS
+        if str(given.get(key) or "").strip()
+    }
+    moduli = tuple(map(read_modulo, given.get("modulo") or ()))
+    own = Answers(columns=columns, modulo=moduli, **fields)
+    return with_options(own, map(str, given.get("options") or ()))
 
 
 def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:

@@ -11,6 +11,7 @@ import numpy as np
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import Candidate, Choice, Question
+from winchkit.runs.importing.clocks.row_order import rows_in_order
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
 from winchkit.runs.importing.orientation import (
@@ -82,7 +83,7 @@ def choose(
     :class:`Answers`. Returns: every column is in ``chosen`` or in ``unused``.
     """
     choice = Choice()
-    linear = _is_linear(table, given, motion)
+    linear = is_linear(table, given, motion)
     numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
@@ -161,7 +162,7 @@ def _left_after(
     return [item for item in free if item.channel not in taken]
 
 
-def _is_linear(table: Table, given: Mapping[str, str], motion: str) -> bool:
+def is_linear(table: Table, given: Mapping[str, str], motion: str = "") -> bool:
     """Whether a file is of a linear axis: a position in m and a force in N, nothing that turns."""
     bases = {channel.rpartition(".")[2] for channel in given.values()}
     if motion or bases & ROTARY.keys():
@@ -340,7 +341,9 @@ def _quality(item: Candidate) -> tuple[bool, bool, bool, int]:
         values, absolute = stamps.values, stamps.has_date
     else:
         absolute = epoch_unit(values) is not None
-    distinct, steps = len(np.unique(values)), np.diff(values[np.isfinite(values)])
+    distinct, known = len(np.unique(values)), values[np.isfinite(values)]
+    # A few rows out of order are left out.
+    steps = np.diff(known[rows_in_order(known)])
     complete = distinct >= 0.99 * len(values) and not (np.any(steps < 0) and np.any(steps > 0))
     is_source = item.column.name == SOURCE_STAMP
     return (

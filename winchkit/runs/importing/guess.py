@@ -21,7 +21,7 @@ from winchkit.runs.importing.assignment import (
 )
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
-from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
+from winchkit.runs.importing.formats.arithmetic import fault_of, is_expression, with_derived
 from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis, marker_column
 from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
@@ -115,6 +115,9 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
             missing.append(Question(text, (f"--column {item.channel}={item.source}*FACTOR",)))
         elif column is not None:
             found[column.source] = item
+        elif is_expression(item.source):
+            text = fault_of(table, item.source)
+            missing.append(Question(text, (f'--column "{item.channel}=COLUMN"',)))
         elif item.source:
             names = ", ".join(repr(c.source) for c in table.columns)
             text = f"there is no column '{item.source}'; the file has {names}"

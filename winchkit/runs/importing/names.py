@@ -188,7 +188,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (
         r"\b(length|lange|longueur|longitud|lunghezza|draw ?wire|seilzug\w*|distance|"
         r"abstand|weg|wegstrecke|"
-        r"displacement|stroke|hub|laser|extension)\b",
+        r"displacement|disp|stroke|hub|laser|extension)\b",
         2,
         "cable_length",
     ),

@@ -27,6 +27,8 @@ _SHORT = 3
 """Samples after which a spike has returned."""
 _GAP = 2.5
 """Median intervals of a gap, as two lost samples are."""
+_FASTER = 2.0
+"""Rate over a gap, in the largest rate elsewhere, from which it is no motion."""
 _AMBIGUOUS = 0.5
 """Share of the modulus that a counter passes in a gap over which its turns are not known."""
 
@@ -76,9 +78,12 @@ def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterat
     unit = "m" if is_linear else "rad"
     beyond = _outstanding(rates, steps)
     modulus = streams.wraps.get(name, np.inf)
-    fastest = float(np.max(np.abs(np.delete(rates, beyond)), initial=0.0))
+    is_gap = intervals > _GAP * usual
+    others = np.setdiff1d(np.flatnonzero(~is_gap), beyond)
+    fastest = float(np.max(np.abs(rates[others]), initial=0.0))
+    beyond += map(int, np.flatnonzero(is_gap & (np.abs(rates) > _FASTER * fastest)))
     largest = float(np.max(np.abs(np.delete(steps, beyond)), initial=0.0))
-    gaps = (intervals > _GAP * usual) & (fastest * intervals > _AMBIGUOUS * modulus)
+    gaps = is_gap & (fastest * intervals > _AMBIGUOUS * modulus)
     for index in sorted({*beyond, *map(int, np.flatnonzero(gaps))}):
         is_lost = bool(gaps[index])
         if not is_lost and velocity is not None:

@@ -35,14 +35,17 @@ def delays(work: Work) -> Iterator[str]:
     """Notes on the delay of the log time after the stamp that is used, by topic."""
     for clock in work.columns:
         group, name = clock.column.group, clock.column.name
-        others = (c for c in work.table.columns if c.group == group and c.name == LOG_TIME)
-        log = next(others, None) if clock.base == "time" and name == SOURCE_STAMP else None
-        if log is None:
+        both = {c.name: c for c in work.table.columns if c.group == group}
+        log = both.get(LOG_TIME)
+        if clock.base != "time" or log is None or SOURCE_STAMP not in both:
+            continue
+        if name == LOG_TIME:
+            yield f"{group}: time is the log time; {SOURCE_STAMP} goes back or repeats"
             continue
         delay = (log.values - clock.column.values) * 1e-9
         low, middle, high = np.percentile(delay, [5, 50, 95])
         text = (
-            f"{group}: time is {SOURCE_STAMP}; the log time is later by {_seconds(middle)} "
+            f"{group}: time is {SOURCE_STAMP}; the delay of the log time is {_seconds(middle)} "
             f"(90 % of the messages: {_seconds(low)} to {_seconds(high)})"
         )
         steps = np.diff(log.values) * 1e-9

@@ -155,6 +155,18 @@ def test_a_gap_of_a_counter_that_wraps_cuts_a_run(tmp_path: Path) -> None:
         assert sorted(item.name for item in folder.glob("*.csv")) == names
 
 
+def test_a_counter_that_wraps_in_a_gap_alone_cuts_a_run(tmp_path: Path) -> None:
+    """No other step says that it wraps: its rate over the gap is that of no motion."""
+    time = np.delete(np.arange(400) / 100, slice(195, 206))
+    counts = np.mod(20_000 + 22_768 * time + 50 * np.sin(9 * time), 65_536)
+    path = log(tmp_path / "a.csv", "position [counts]", np.round(counts), time)
+    code, output = command(path, "-o", tmp_path / "runs", "-y", "--counts-per-turn", "4096")
+    assert code == 0
+    assert "rows were lost" in output
+    pieces = [read_run(item) for item in sorted((tmp_path / "runs").glob("*.csv"))]
+    assert [len(piece) for piece in pieces] == [195, 194]
+
+
 def test_motions_and_spikes_are_no_jumps(tmp_path: Path) -> None:
     """Steps between slow samples at rest, one spike, one fast move that the velocity has."""
     steps = np.repeat([0.0, 5.0, 5.0, 12.0, 0.0], 60) + 1e-3 * np.sin(np.arange(300))

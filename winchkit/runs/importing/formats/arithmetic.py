@@ -66,6 +66,18 @@ def _derived(table: Table, source: str, place: int) -> Column | None:
     return Column(source, array, unit, group=groups.pop(), number=place, source=source)
 
 
+def fault_of(table: Table, source: str) -> str:
+    """Why an expression is no column of a table."""
+    names = [name for name in _OPERATOR.split(source.strip())[::2] if name]
+    found = {name: table.column(name) for name in names if number(name, ".") is None}
+    unknown = [n for n, item in found.items() if item is None and n not in table.constants]
+    if unknown:
+        has = ", ".join(repr(item.source) for item in table.columns)
+        return f"there is no column '{unknown[0]}' for '{source}'; the file has {has}"
+    units = ", ".join(f"'{n}' [{item.unit or '1'}]" for n, item in found.items() if item)
+    return f"'{source}' is no sum of numbers of one rate in one unit or convertible ones: {units}"
+
+
 def _term(
     table: Table, is_negative: bool, factors: list[str]
 ) -> tuple[Array | float, str, list[Column]] | None:

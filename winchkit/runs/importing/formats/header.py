@@ -120,25 +120,26 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
     end = cut
     keys = KEYS if keyed_width(rows) else frozenset()
     while cut:
-        if _is_rule(rows[cut - 1][1]):
-            cut -= 1
-            continue
-        cells = _uncommented(rows[cut - 1][1], width)
+        own = rows[cut - 1][1]
+        cells = _uncommented(own, width)
         given = [cell for cell in cells if cell]
-        texts = [cell for cell in given if number(cell, decimal) is None]
-        spread = cells and not cells[0] and given and (end > cut or is_unit_row(cells))
-        is_comment = bool(_COMMENT.match(rows[cut - 1][1][0])) if rows[cut - 1][1] else False
-        fits = (len(cells) <= width + 1 and not is_comment) or len(cells) == width
-        fits = fits or (is_blank and len([c for c in cells if c[:1] not in "(["]) == width)
-        fits = fits and (spread or 2 * len(given) >= width)
-        if given and not is_comment and cells[0] in keys:
-            cut -= 1
-            continue
-        if not given or not fits or (not texts and not spread):
-            break
-        if len(given) == 1 and width > 1 and not spread:
-            break
-        if end > cut and len(given) == 2 and width > 3 and not spread:
+        is_comment = bool(own and _COMMENT.match(own[0]))
+        # Labels that stand once for several columns, above others.
+        is_spread = bool(given) and not cells[0] and (end > cut or is_unit_row(cells))
+        bare = [cell for cell in cells if cell[:1] not in "(["] if is_blank else cells
+        is_wide = width in {len(cells), len(bare)} or (len(cells) <= width + 1 and not is_comment)
+        is_number = all(number(cell, decimal) is not None for cell in given)
+        # Whether a row belongs to the columns: the first case that holds.
+        cases = (
+            (_is_rule(own), True),
+            (bool(given) and not is_comment and cells[0] in keys, True),
+            (not given or not is_wide, False),
+            (is_spread, True),
+            (len(given) == 1 < width, False),
+            (2 * len(given) < width or is_number, False),
+            (end > cut and len(given) == 2 and width > 3, False),
+        )
+        if not next((belongs for holds, belongs in cases if holds), True):
             break
         cut -= 1
     return cut
