@@ -3,54 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.streams import Streams
 
-if TYPE_CHECKING:
-    from winchkit.runs.importing.streams import Streams
-
-_TITLES = frozenset(
-    (
-        *("point", "point name", "point id", "point no", "pt", "pt id", "name", "target"),
-        *("pose", "pose no", "pose name", "punkt", "punktname", "punktnummer"),
-    )
-)
-"""Titles of a column with the names of points, which may be numbers."""
-_DISTINCT = 0.9
-"""Share of the rows with a name of their own, at least: other texts are remarks or states."""
 _SHARED = 0.5
 """Share of the names of the shorter file that the other one has, at least (rule of thumb): with
 fewer the two are lists of different points."""
 _SHOWN = 6
 """Names listed in a text."""
-
-
-def names_of_points(table: Table, used: Collection[str]) -> tuple[Sequence[str], ...]:
-    """Columns that may be the names of points: texts, or numbers below such a title.
-
-    ``used``: columns of channels.
-    """
-    found = []
-    for column in table.columns:
-        titled = words_of(column.name) in _TITLES
-        names = column.texts
-        if names is None and titled:
-            names = [f"{value:.12g}" for value in column.values.tolist()]
-        if names is None or column.source in used or not names:
-            continue
-        names = [name.strip() for name in names]
-        if len(set(names)) >= _DISTINCT * len(names):
-            found.append(names)
-    return tuple(found)
 
 
 def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | None:
