@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,8 +19,6 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
-    from winchkit.schema.programme import Programme
-    from winchkit.schema.robot_programme import RobotProgramme
 
 _RATE = 50.0
 """Hz."""
@@ -109,7 +107,8 @@ def command(
     with progress_bar() as progress:
         for index, name in enumerate(named):
             path, done = programme_path(name), index / len(named) if len(named) > 1 else None
-            value = load(path).value
+            value: Any = load(path).value
+            runs: Iterable[tuple[Path, Run]]
             if (of_wing := wings.call("record", value)) is not None:
                 if rate is not None:
                     raise UsageError(
@@ -126,7 +125,7 @@ def command(
                 made = simulate(declared, profiles, value, seed=seed, rate=hertz)
                 runs = _written(made, output, suffix)
             for file, run in runs:
-                written.append(_entry(file, run, value))
+                written.append(_entry(file, run, value.name))
                 progress(f"{value.name}: {file.name} written", done)
                 if not is_json():
                     click.echo(file)
@@ -149,10 +148,10 @@ def _written(runs: Iterable[Run], folder: Path, suffix: str) -> Iterator[tuple[P
         yield path, run
 
 
-def _entry(path: Path, run: Run, programme: Programme | RobotProgramme) -> dict[str, object]:
+def _entry(path: Path, run: Run, programme: str) -> dict[str, object]:
     return {
         "path": str(path),
-        "programme": programme.name,
+        "programme": programme,
         "load_mass": run.load_mass,
         "rows": len(run),
         "seconds": float(run.time[-1]),

@@ -28,7 +28,7 @@ def simulated_robot(sim: SimBench, seed: int = 0) -> Iterator[Bench]:
         LiveBench(sim, seed=seed, simulated_time=clock, compiled=True) as live,
         open_bench(live.bench_spec, clock) as opened,
     ):
-        # The tracker sends to nobody until it is asked for.
+        # The bench receives its tracker from the first use on.
         _ = opened.tracker
         clock.sleep(_INSTRUMENTS)
         yield opened

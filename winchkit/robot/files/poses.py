@@ -178,7 +178,7 @@ def _numbers(poses: Measured) -> Iterator[bytes]:
 def held_unmeasured(measured: Measured, profile: RobotProfile) -> NDArray[np.bool_]:
     """Coordinates of a position that guides hold and nothing measured, (3,): in no distance."""
     seen = np.any(np.isfinite(measured.position), axis=0)
-    return ~seen & (np.array(profile.platform.free[:3]) == 0)
+    return np.asarray(~seen & (np.array(profile.platform.free[:3]) == 0))
 
 
 def of_poses(mask: NDArray[np.bool_]) -> str:

@@ -15,8 +15,8 @@ from winchkit.errors import Fault
 from winchkit.model.rotation import quaternion_of
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
-from winchkit.runs.importing.clocks.point_names import names_of_points
 from winchkit.runs.importing.clocks.row_order import STILL, rows_in_order
+from winchkit.runs.importing.formats.point_table import names_of_points
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.orientation import rotation_as

@@ -101,24 +101,19 @@ class _Frame(Marker):
         """Convert a value of a file to SI; raises UsageError with the reason."""
         if raw == UNKNOWN:
             return "unknown"
-        keys = set(raw) - {"up"} if isinstance(raw, dict) else set()
-        if keys not in ({"position", "rotation"}, {"origin", "x_point"}) or (
-            "up" in raw and "origin" not in raw
-        ):
-            raise UsageError(f"expected {self.wanted}, not {raw!r}")
-        length = Quantity("length")
-        if "origin" in keys:
-            origin, x_point = (
-                _vector(raw[key], length, self.wanted) for key in ("origin", "x_point")
-            )
-            up = _vector(raw.get("up", (0, 0, 1)), Quantity("ratio"), self.wanted)
+        given = raw if isinstance(raw, dict) else {}
+
+        def vector(key: str, dimension: str) -> Vector:
+            return _vector(given[key], Quantity(dimension), self.wanted)
+
+        if given.keys() == {"position", "rotation"}:
+            return FrameSpec(vector("position", "length"), vector("rotation", "angle"))
+        if given.keys() | {"up"} == {"origin", "x_point", "up"}:
+            up = vector("up", "ratio") if "up" in given else (0.0, 0.0, 1.0)
             if not any(up):
                 raise UsageError("up is zero; it is the direction against gravity")
-            return _through(origin, x_point, up)
-        return FrameSpec(
-            _vector(raw["position"], length, self.wanted),
-            _vector(raw["rotation"], Quantity("angle"), self.wanted),
-        )
+            return _through(vector("origin", "length"), vector("x_point", "length"), up)
+        raise UsageError(f"expected {self.wanted}, not {raw!r}")
 
 
 def _vector(raw: object, marker: Quantity, wanted: str) -> Vector:

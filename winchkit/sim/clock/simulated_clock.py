@@ -216,7 +216,7 @@ class SimulatedClock:
         self._datagrams[address] = take
 
     def send_datagram(self, address: str, datagram: bytes) -> None:
-        """Deliver a datagram to who receives at an address; it is lost where nobody does.
+        """Deliver a datagram to who receives at an address; without a receiver it is lost.
 
         Parameters
         ----------

@@ -339,9 +339,9 @@ class LiveBench:
             )
             self.robot = robot
             profiles, loads, truth = robot.profiles, robot.ends, robot.truth
-            wiring = sim.bench.robot
-            if self._simulated is not None and wiring is not None and wiring.tracker is not None:
-                robot.on_pose = partial(self._simulated.send_datagram, wiring.tracker.listen)
+            tracker = None if sim.bench.robot is None else sim.bench.robot.tracker
+            if self._simulated is not None and tracker is not None:
+                robot.on_pose = partial(self._simulated.send_datagram, tracker.listen)
         for name, wiring in sim.bench.winch.items():
             port = self._ports.get(wiring.servo.bus)
             if port is None:

@@ -3,54 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.streams import Streams
 
-if TYPE_CHECKING:
-    from winchkit.runs.importing.streams import Streams
-
-_TITLES = frozenset(
-    (
-        *("point", "point name", "point id", "point no", "pt", "pt id", "name", "target"),
-        *("pose", "pose no", "pose name", "punkt", "punktname", "punktnummer"),
-    )
-)
-"""Titles of a column with the names of points, which may be numbers."""
-_DISTINCT = 0.9
-"""Share of the rows with a name of their own, at least: other texts are remarks or states."""
 _SHARED = 0.5
 """Share of the names of the shorter file that the other one has, at least (rule of thumb): with
 fewer the two are lists of different points."""
 _SHOWN = 6
 """Names listed in a text."""
-
-
-def names_of_points(table: Table, used: Collection[str]) -> tuple[Sequence[str], ...]:
-    """Columns that may be the names of points: texts, or numbers below such a title.
-
-    ``used``: columns of channels.
-    """
-    found = []
-    for column in table.columns:
-        titled = words_of(column.name) in _TITLES
-        names = column.texts
-        if names is None and titled:
-            names = [f"{value:.12g}" for value in column.values.tolist()]
-        if names is None or column.source in used or not names:
-            continue
-        names = [name.strip() for name in names]
-        if len(set(names)) >= _DISTINCT * len(names):
-            found.append(names)
-    return tuple(found)
 
 
 def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | None:
@@ -61,21 +28,16 @@ def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | N
     """
     if len(first.streams) != 1 or len(other.streams) != 1:
         return None
-    best: tuple[int, dict[str, int], dict[str, int]] | None = None
-    for own, theirs in product(first.names, other.names):
-        rows, others = _kept(first, own), _kept(other, theirs)
-        count = len(rows.keys() & others.keys())
-        if count > max(1.0, _SHARED * min(len(rows), len(others))) and (
-            best is None or count > best[0]
-        ):
-            best = count, rows, others
-    if best is None:
+    pairs = product(_of_samples(first), _of_samples(other))
+    shared = [(len(set(own) & set(theirs) - {""}), own, theirs) for own, theirs in pairs]
+    count, own, theirs = max(shared, key=lambda item: item[0], default=(0, [], []))
+    if not count > max(1.0, _SHARED * min(len(own), len(theirs))):
         return None
-    _, rows, others = best
+    rows, others = _places(first, own), _places(other, theirs)
     both = [name for name in rows if name in others]
     text = f"joined by the names of {len(both)} points"
-    for streams, own, of in ((first, rows, others), (other, others, rows)):
-        if alone := [name for name in own if name not in of]:
+    for streams, here, there in ((first, rows, others), (other, others, rows)):
+        if alone := [name for name in here if name not in there]:
             more = "" if len(alone) <= _SHOWN else f" and {len(alone) - _SHOWN} others"
             listed = ", ".join(alone[:_SHOWN]) + more
             text += f"; {listed} of {streams.path} left out, which the other file does not have"
@@ -86,24 +48,28 @@ def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | N
     )
 
 
-def _kept(streams: Streams, names: Sequence[str]) -> dict[str, int]:
-    """Place of each name among the samples; raises RunError for one that stands in several."""
+def _of_samples(streams: Streams) -> list[list[str]]:
+    """Columns of names, of the samples that are used."""
     (stream,) = streams.streams
-    own = [names[row] for row in stream.rows.tolist()]
-    counts = Counter(own)
+    return [[names[row] for row in stream.rows.tolist()] for names in streams.names]
+
+
+def _places(streams: Streams, names: Sequence[str]) -> dict[str, int]:
+    """Place of each name among the samples; raises RunError for one that stands in several."""
+    (stream,), counts = streams.streams, Counter(names)
     faults = [
         Fault(
             f"the point '{name}' stands in {counts[name]} rows, one of which is joined: give each "
             "measurement a name of its own, or leave one",
             streams.path,
-            streams.line_of(int(stream.rows[place])),
+            streams.line_of(int(stream.rows[names.index(name)])),
         )
-        for place, name in enumerate(own)
-        if name and counts[name] > 1 and own.index(name) == place
+        for name in counts
+        if name and counts[name] > 1
     ]
     if faults:
         raise RunError(faults)
-    return {name: place for place, name in enumerate(own) if name}
+    return {name: place for place, name in enumerate(names) if name}
 
 
 def _at(streams: Streams, places: NDArray[np.intp]) -> Streams:

@@ -1,4 +1,4 @@
-"""Tables of points without a header, as laser trackers export them: a name and three coordinates.
+"""Tables of points: their names, and those without a header, as laser trackers export them.
 
     P001;903.3055;2062.6540;582.5511
     A Poses P001 903.3055 2062.6540 582.5511
@@ -11,15 +11,26 @@ above do not declare it.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import takewhile
 
+from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column, Table, named_apart
 
 _NAMES = ("Collection", "Group", "Point")
 """Names before the coordinates; fewer are the last of them."""
 _COORDINATES = ("X", "Y", "Z")
 _PROGRAM = "spatialanalyzer"
+_TITLES = frozenset(
+    (
+        *("point", "point name", "point id", "point no", "pt", "pt id", "name", "target"),
+        *("pose", "pose no", "pose name", "punkt", "punktname", "punktnummer"),
+    )
+)
+"""Titles of a column with the names of points, which may be numbers."""
+_DISTINCT = 0.9
+"""Share of the rows with a name of their own, at least: other texts are remarks or states."""
 
 
 def with_coordinates(table: Table) -> Table:
@@ -44,3 +55,22 @@ def with_coordinates(table: Table) -> Table:
 
 def _is_text(column: Column) -> bool:
     return column.texts is not None
+
+
+def names_of_points(table: Table, used: Collection[str]) -> tuple[Sequence[str], ...]:
+    """Columns that may be the names of points: texts, or numbers below such a title.
+
+    ``used``: columns of channels.
+    """
+    found = []
+    for column in table.columns:
+        titled = words_of(column.name) in _TITLES
+        names = column.texts
+        if names is None and titled:
+            names = [f"{value:.12g}" for value in column.values.tolist()]
+        if names is None or column.source in used or not names:
+            continue
+        names = [name.strip() for name in names]
+        if len(set(names)) >= _DISTINCT * len(names):
+            found.append(names)
+    return tuple(found)
