@@ -154,6 +154,9 @@ def with_standing(
     )
 
 
+_OF_DELAY = 10.0
+"""The same for a delay (0.32 of its change is its own): where the motion has one speed or one
+frequency, friction and the phase of a ripple imitate it."""
 _SERIOUS = frozenset(
     {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel", "reversal"}
 )
@@ -181,8 +184,12 @@ def _doubts(
     values = step.parameters.get(term.effect.id, {})
     if reason := implausible(term, values, engine.profile):
         out.append(Doubt("implausible", reason))
-    if collinearity(regression, result.final, result.noise, index) > _LARGEST_COLLINEARITY:
-        what = "the others imitate its change to within 0.3 %: their values may cancel each other"
+    largest = _OF_DELAY if term.effect.is_delay else _LARGEST_COLLINEARITY
+    if collinearity(regression, result.final, result.noise, index) > largest:
+        within = "a third" if term.effect.is_delay else "0.3 %"
+        what = (
+            f"the others imitate its change to within {within}: their values may cancel each other"
+        )
         out.append(Doubt("collinear", what))
     if not result.final.converged:
         steps = result.final.iterations

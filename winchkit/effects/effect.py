@@ -194,6 +194,11 @@ class Effect:
         return ""
 
     @property
+    def is_delay(self) -> bool:
+        """Whether its size is a time: a signal is late, or early."""
+        return any(p.role == "amplitude" and p.unit == "s" for p in self.parameters)
+
+    @property
     def place(self) -> tuple[tuple[str, str, str | None], ...]:
         """Part, output and variable (None without one) at which it acts, for each output."""
         part = self.part or PARTS[self.stage]

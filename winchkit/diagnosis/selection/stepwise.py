@@ -165,6 +165,18 @@ def _forward_selection(
     return present, noise, tried
 
 
+def with_delays(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """The model with delays where they are accepted; they never take the place of its effects."""
+    engine.delays_wait = False
+    while True:
+        delays = [s for s in engine.scores(present, noise) if s.candidate.effect.is_delay]
+        trials = [engine.trial(present, item, noise) for item in delays if item.net_gain > 0]
+        larger = best_accepted(engine, present, noise, trials)
+        if larger is None:
+            return present, noise
+        present, noise = engine.fit_with_noise(larger.hypothesis, noise)
+
+
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Largest score that noise alone exceeds in 1 % of cases."""
     chance = null_maxima(engine.projected(present, noise), engine.regression.n_observations)
