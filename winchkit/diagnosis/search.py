@@ -108,17 +108,20 @@ def _with_transitions(
     engine: TimeSeriesSelection,
     catalogue: Catalogue,
     trials: Callable[[str], None],
-    known: Callable[[SelectionResult], None],
+    known: Callable[[SelectionResult], None] = lambda first: None,
+    is_enough: Callable[[Fit], bool] = lambda present: False,
 ) -> tuple[SelectionResult, tuple[TimeSeriesSelection, Catalogue] | None]:
     """Result of the search, and engine and catalogue where reversals of friction are rounded.
 
     As soon as a friction that was found fits better with a transition, the search begins again with
-    it in every law of friction.
+    it in every law of friction. It ends where ``is_enough``.
     """
     transitions: dict[str, float] = {}
     delays_wait = engine.delays_wait
 
     def is_rounded(present: Fit, noise: Noise) -> bool:
+        if is_enough(present):
+            return True
         transitions.update(scanned_transitions(engine, present, noise))
         return bool(transitions)
 
@@ -129,6 +132,7 @@ def _with_transitions(
     rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue.of_winches())
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial, again.delays_wait = trials, delays_wait
+    again.on_step = lambda present, noise: is_enough(present)
     return stepwise_selection(again), (again, rounded)
 
 
@@ -142,17 +146,22 @@ def _with_delays_last(
     they are the model, and delays are added to it where they are accepted.
     """
 
-    def added(found: SelectionResult) -> list[Effect]:
-        return [term.effect for term in found.final.hypothesis.terms[engine.n_initial_terms :]]
+    def added(fitted: Fit) -> list[Effect]:
+        return [term.effect for term in fitted.hypothesis.terms[engine.n_initial_terms :]]
 
-    if not any(effect.is_delay for effect in added(result)):
+    def has_more(fitted: Fit) -> bool:
+        return len(added(fitted)) > len(added(result.final))
+
+    if not any(effect.is_delay for effect in added(result.final)):
         return engine, result
     other = selection_engine(engine.regression.dataset, catalogue)
     other.on_trial, other.delays_wait = engine.on_trial, True
-    found, rounded = _with_transitions(other, catalogue, engine.on_trial, lambda first: None)
+    found, rounded = _with_transitions(other, catalogue, engine.on_trial, is_enough=has_more)
+    if has_more(found.final):
+        return engine, result
     other, catalogue = rounded or (other, catalogue)
     other, found = _with_plain_laws(other, found, catalogue)
-    if len(added(found)) > len(added(result)) or not _explains_as_much(engine, result, found):
+    if has_more(found.final) or not _explains_as_much(engine, result, found):
         return engine, result
     final, noise = with_delays(other, found.final, found.noise)
     return other, replace(found, final=final, noise=noise, scores=result.scores, tried=result.tried)
