@@ -14,7 +14,11 @@ import numpy as np
 
 from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
+from winchkit.diagnosis.regression.conditioning import (
+    COLLINEAR_DELAY,
+    collinearity,
+    value_covariance,
+)
 from winchkit.diagnosis.regression.cross_validation import excess, held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -154,9 +158,6 @@ def with_standing(
     )
 
 
-_OF_DELAY = 10.0
-"""The same for a delay (0.32 of its change is its own): where the motion has one speed or one
-frequency, friction and the phase of a ripple imitate it."""
 _SERIOUS = frozenset(
     {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel", "reversal"}
 )
@@ -184,7 +185,7 @@ def _doubts(
     values = step.parameters.get(term.effect.id, {})
     if reason := implausible(term, values, engine.profile):
         out.append(Doubt("implausible", reason))
-    largest = _OF_DELAY if term.effect.is_delay else _LARGEST_COLLINEARITY
+    largest = COLLINEAR_DELAY if term.effect.is_delay else _LARGEST_COLLINEARITY
     if collinearity(regression, result.final, result.noise, index) > largest:
         within = "a third" if term.effect.is_delay else "0.3 %"
         what = (

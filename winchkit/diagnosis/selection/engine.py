@@ -206,8 +206,8 @@ class SelectionEngine(ABC):
         return float(np.log(self.regression.n_observations))
 
     def place_in_catalogue(self, effect_id: str) -> int:
-        """Number of a candidate in the order of the catalogue; after the last for another one."""
-        ids = [effect.id for effect in self._candidates]
+        """Number of a candidate in the order of the catalogue, delays last; after them another."""
+        ids = [effect.id for effect in sorted(self._candidates, key=lambda one: one.is_delay)]
         return ids.index(effect_id) if effect_id in ids else len(ids)
 
     def grouped(self, folds: Folds) -> bool:

@@ -19,6 +19,7 @@ from itertools import dropwhile
 
 import numpy as np
 
+from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
 from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
@@ -166,13 +167,14 @@ def _forward_selection(
 
 
 def with_delays(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
-    """The model with delays where they are accepted; they never take the place of its effects."""
+    """The model with delays where they are accepted and its effects do not imitate them."""
     engine.delays_wait = False
     while True:
         delays = [s for s in engine.scores(present, noise) if s.candidate.effect.is_delay]
         trials = [engine.trial(present, item, noise) for item in delays if item.net_gain > 0]
         larger = best_accepted(engine, present, noise, trials)
-        if larger is None:
+        last = len(present.hypothesis.terms)
+        if larger is None or collinearity(engine.regression, larger, noise, last) > COLLINEAR_DELAY:
             return present, noise
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
 
