@@ -15,7 +15,9 @@ HEADER = "time [s],motor_angle [rad],motor_torque [N m],predicted_torque [N m]"
 NOISE = 0.05
 
 
-def arm(folder: Path, *, sign: float = 1.0, gap: bool = False) -> tuple[Path, Path]:
+def arm(
+    folder: Path, *, sign: float = 1.0, gap: bool = False, late: float = 0.0
+) -> tuple[Path, Path]:
     """A joint of a rigid body with load-dependent friction, and its author's frictionless model."""
     rng, time = np.random.default_rng(4), np.arange(0, 40, 0.01)
     angle = 1.2 * np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time)
@@ -24,6 +26,7 @@ def arm(folder: Path, *, sign: float = 1.0, gap: bool = False) -> tuple[Path, Pa
     model = 1.9 * acceleration + 22 * np.sin(angle + 0.3) + 3 * np.sin(2 * angle)
     torque = model + (1.2 + 0.12 * np.abs(model)) * np.tanh(rate / 2e-3)
     torque += NOISE * rng.standard_normal(len(time))
+    model = np.interp(time - late, time, model)
     if gap:
         model = np.where((time > 10) & (time < 11), np.nan, model)
     run, profile = folder / "arm.csv", folder / "joint.toml"
@@ -44,6 +47,16 @@ def test_friction_that_a_model_lacks_is_named_with_its_values(tmp_path: Path, ga
     assert share.value == pytest.approx(0.12, abs=4 * share.std)
     assert coulomb.value == pytest.approx(1.2, abs=4 * coulomb.std)
     assert found.outputs["motor_torque"].heldout_rms_after < 1.5 * NOISE
+
+
+@pytest.mark.parametrize("late", [0.1, -0.1])
+def test_a_model_that_is_shifted_is_told_beside_its_friction(tmp_path: Path, late: float) -> None:
+    run, profile = arm(tmp_path, late=late)
+    found = diagnose([read_run(run)], read_profile(profile)).diagnosis
+    values = {step.effects[0]: step.parameters[step.effects[0]] for step in found.steps}
+    assert values["prediction-delay"]["delay"].value == pytest.approx(late, abs=5e-3)
+    assert set(values) <= {"prediction-delay", "friction-of-load", "motor-coulomb"}
+    assert found.outputs["motor_torque"].heldout_rms_after < 3 * NOISE
 
 
 def test_the_error_is_that_of_the_model_alone(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ wound_turns = 6.0
 """
 REFUSED = {
     "cable-elongation-quartic", "cell-lag", "drum-winding-tension", "length-time-offset",
-    "torque-lag", "torque-lead",
+    "torque-lag", "torque-lead", "prediction-delay",
 }  # fmt: skip
 """Effects of the catalogue whose function is none of one sample."""
 BETWEEN = {"cable-hysteresis", "cell-hysteresis", "pulley-inertia"}

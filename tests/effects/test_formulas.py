@@ -353,6 +353,7 @@ OWN_TESTS = {
     "length-time-offset",
     "drum-winding-tension",
     "torque-lead",
+    "prediction-delay",
 }
 
 

@@ -1,7 +1,8 @@
 """Search of a diagnosis: stepwise selection, started again where it shows another data set or law.
 
 The selection is repeated with rounded reversals of friction, with an offset per run, and without
-the samples of impacts, each where it predicts held-out data better; then with the simplest laws.
+the samples of impacts, each where it predicts held-out data better; then with the simplest laws,
+and with delays as the last candidates.
 """
 
 from __future__ import annotations
@@ -14,13 +15,18 @@ import numpy as np
 
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import predicts_better
-from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.selection.stepwise import (
+    SelectionResult,
+    stepwise_selection,
+    with_delays,
+)
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.transitions import (
     scanned_transitions,
@@ -45,6 +51,8 @@ _SEARCH = (0.4, 0.8)
 of the processor time and ends at 79 to 86 %."""
 _NAMING = (0.8, 1.0)
 """The same for the equivalence sets; measured: the rest."""
+_OF_EXPLAINED = 0.1
+"""The tenth of the decision: what a law may leave of what it explains."""
 
 
 def no_progress(what: str, share: float) -> None:
@@ -93,23 +101,27 @@ def search(
     if reduced is not None:
         engine, result = again(reduced, "without impacts")
     engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-    return engine, _simplified(engine, result)
+    return _with_delays_last(engine, _simplified(engine, result), catalogue)
 
 
 def _with_transitions(
     engine: TimeSeriesSelection,
     catalogue: Catalogue,
     trials: Callable[[str], None],
-    known: Callable[[SelectionResult], None],
+    known: Callable[[SelectionResult], None] = lambda first: None,
+    is_enough: Callable[[Fit], bool] = lambda present: False,
 ) -> tuple[SelectionResult, tuple[TimeSeriesSelection, Catalogue] | None]:
     """Result of the search, and engine and catalogue where reversals of friction are rounded.
 
     As soon as a friction that was found fits better with a transition, the search begins again with
-    it in every law of friction.
+    it in every law of friction. It ends where ``is_enough``.
     """
     transitions: dict[str, float] = {}
+    delays_wait = engine.delays_wait
 
     def is_rounded(present: Fit, noise: Noise) -> bool:
+        if is_enough(present):
+            return True
         transitions.update(scanned_transitions(engine, present, noise))
         return bool(transitions)
 
@@ -119,8 +131,55 @@ def _with_transitions(
         return result, None
     rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue.of_winches())
     again = selection_engine(engine.regression.dataset, rounded)
-    again.on_trial = trials
+    again.on_trial, again.delays_wait = trials, delays_wait
+    again.on_step = lambda present, noise: is_enough(present)
     return stepwise_selection(again), (again, rounded)
+
+
+def _with_delays_last(
+    engine: TimeSeriesSelection, result: SelectionResult, catalogue: Catalogue
+) -> tuple[TimeSeriesSelection, SelectionResult]:
+    """The result, or that in which delays were the last candidates.
+
+    A delay found first may take a part of cogging and friction, whose sizes are then wrong. Where
+    no more effects without any delay leave at most a tenth more of what the given result explains,
+    they are the model, and delays are added to it where they are accepted.
+    """
+
+    def added(fitted: Fit) -> list[Effect]:
+        return [term.effect for term in fitted.hypothesis.terms[engine.n_initial_terms :]]
+
+    def has_more(fitted: Fit) -> bool:
+        return len(added(fitted)) > len(added(result.final))
+
+    if not any(effect.is_delay for effect in added(result.final)):
+        return engine, result
+    other = selection_engine(engine.regression.dataset, catalogue)
+    other.on_trial, other.delays_wait = engine.on_trial, True
+    found, rounded = _with_transitions(other, catalogue, engine.on_trial, is_enough=has_more)
+    if has_more(found.final):
+        return engine, result
+    other, catalogue = rounded or (other, catalogue)
+    found = _simplified(other, found)
+    if has_more(found.final) or not _explains_as_much(engine, result, found):
+        return engine, result
+    final, noise = with_delays(other, found.final, found.noise)
+    return other, replace(found, final=final, noise=noise, scores=result.scores, tried=result.tried)
+
+
+def _explains_as_much(
+    engine: TimeSeriesSelection, result: SelectionResult, other: SelectionResult
+) -> bool:
+    """Whether another result leaves at most a tenth more of what a result explains."""
+    regression = engine.regression
+    before, now, then = (
+        held_out_rms(regression, fitted, result.noise, regression.blocks)
+        for fitted in (result.initial_model, result.final, other.final)
+    )
+    return all(
+        then[name] ** 2 - now[name] ** 2 <= _OF_EXPLAINED * (before[name] ** 2 - now[name] ** 2)
+        for name in now
+    )
 
 
 def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:

@@ -14,7 +14,11 @@ import numpy as np
 
 from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
+from winchkit.diagnosis.regression.conditioning import (
+    COLLINEAR_DELAY,
+    collinearity,
+    value_covariance,
+)
 from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -177,8 +181,12 @@ def _doubts(
     values = step.parameters.get(term.effect.id, {})
     if reason := implausible(term, values, engine.profile):
         out.append(Doubt("implausible", reason))
-    if collinearity(regression, result.final, result.noise, index) > _LARGEST_COLLINEARITY:
-        what = "the others imitate its change to within 0.3 %: their values may cancel each other"
+    largest = COLLINEAR_DELAY if term.effect.is_delay else _LARGEST_COLLINEARITY
+    if collinearity(regression, result.final, result.noise, index) > largest:
+        within = "a third" if term.effect.is_delay else "0.3 %"
+        what = (
+            f"the others imitate its change to within {within}: their values may cancel each other"
+        )
         out.append(Doubt("collinear", what))
     if not result.final.converged:
         steps = result.final.iterations

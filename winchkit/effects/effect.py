@@ -19,7 +19,7 @@ from winchkit.model.stages import PARTS, ROBOT_STAGES, At, Stage
 Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
-    "axis", "ungeared", "whole_turns", "torque",
+    "axis", "ungeared", "whole_turns", "torque", "prediction",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -35,6 +35,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "ungeared": "a profile of kind 'axis', or a winch without a gearbox",
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",
+    "prediction": "the torque that another model predicts (--predicted)",
 }
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""
 Output = Literal["cable_length", "tension", "motor_torque"]
@@ -192,6 +193,11 @@ class Effect:
         if self.memory and self.carry is None:
             return "it has memory and no function for its next state (Effect.carry)"
         return ""
+
+    @property
+    def is_delay(self) -> bool:
+        """Whether its size is a time: a signal is late, or early."""
+        return any(p.role == "amplitude" and p.unit == "s" for p in self.parameters)
 
     @property
     def place(self) -> tuple[tuple[str, str, str | None], ...]:

@@ -1,4 +1,4 @@
-"""Location of shape grids in the range of the data: places along a stroke, limits of a reading."""
+"""Candidates within what the data can show: places along a stroke, limits of a reading, delays."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from winchkit.model.variables import VARIABLES
 
 _BELOW = 0.1
 """Smallest extent over that of the grid."""
+_SAMPLES = 2.0
+"""Sampling intervals by which a logger may be late: one of its own, one of the bus."""
 
 
 def located(effect: Effect, motions: Sequence[At]) -> Effect:
@@ -20,12 +22,29 @@ def located(effect: Effect, motions: Sequence[At]) -> Effect:
 
     Returns: grids in the units of their parameters: ``low + share (high − low)`` for a place
     (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``), whose lower
-    bound is a tenth of the least: the data do not show a smaller one.
+    bound is a tenth of the least: the data do not show a smaller one. A delay is bounded by what a
+    filter and a bus can be, and at least by two samples.
     """
+    if effect.is_delay:
+        step = max((float(np.median(np.diff(at.time))) for at in motions), default=0.0)
+        return replace(effect, parameters=tuple(_bounded(p, step) for p in effect.parameters))
     if not any(p.over or p.along for p in effect.parameters):
         return effect
     parameters = tuple(_located(p, motions) for p in effect.parameters)
     return replace(effect, parameters=parameters)
+
+
+def _bounded(parameter: Parameter, step: float) -> Parameter:
+    """A delay within its plausible range, or two sampling intervals where these are longer."""
+    if parameter.plausible is None:
+        return parameter
+    low, high = parameter.plausible.low, parameter.plausible.high
+    longest = max(high, _SAMPLES * step)
+    return replace(
+        parameter,
+        low=max(parameter.low, min(low, -longest if low < 0 else 0.0)),
+        high=min(parameter.high, longest),
+    )
 
 
 def _located(parameter: Parameter, motions: Sequence[At]) -> Parameter:

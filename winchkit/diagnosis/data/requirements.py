@@ -47,6 +47,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "ungeared": is_axis or profile.gearbox.ratio == 1,
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
+        "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
     }
     lacking = [NEED_WORDS[need] for need in effect.needs if not have[need]]
     if not set(effect.outputs) & set(dataset.outputs):

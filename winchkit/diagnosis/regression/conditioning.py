@@ -44,6 +44,12 @@ class ValueCovariance:
     condition: float
 
 
+COLLINEAR_DELAY = 10.0
+"""Variance inflation of a delay (0.32 of its change is its own) above which it is not certain, and
+not added last: where the motion has one speed or one frequency, friction and the phase of a ripple
+imitate it."""
+
+
 def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCovariance:
     """Covariance of the nuisance parameters and values of a fit."""
     whitened = whitened_jacobian(regression, fit, noise)

@@ -34,8 +34,10 @@ def best_of_each(scores: Sequence[Score]) -> list[Score]:
 
 
 def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
-    """Whether the hypothesis contains the effect or one that contains it."""
+    """Whether the hypothesis has the effect, one that contains it, or a delay of its output."""
     for term in hypothesis.terms:
+        if effect.is_delay and term.effect.is_delay and effect.outputs == term.effect.outputs:
+            return True
         if effect.id in term.effect.contains:
             return True
         if term.effect.id == effect.id and (

@@ -119,6 +119,8 @@ class SelectionEngine(ABC):
         Called with the id of every candidate before it is fitted.
     on_step : callable
         Called with the model and its noise after each addition; the search ends where it is true.
+    delays_wait : bool
+        Whether delays are no candidates yet.
     """
 
     regression: Regression
@@ -135,6 +137,7 @@ class SelectionEngine(ABC):
         self._last_projected: LastValue[Projected] = LastValue()
         self.on_trial: Callable[[str], None] = lambda effect: None
         self.on_step: Callable[[Fit, Noise], bool] = lambda fitted, noise: False
+        self.delays_wait = False
         self._optima: dict[Hashable, Hypothesis] = {}
         self._refits: list[tuple[Hypothesis, Noise, float, Fit]] = []
         self._refitted: dict[Hashable, Hypothesis] = {}
@@ -203,8 +206,8 @@ class SelectionEngine(ABC):
         return float(np.log(self.regression.n_observations))
 
     def place_in_catalogue(self, effect_id: str) -> int:
-        """Number of a candidate in the order of the catalogue; after the last for another one."""
-        ids = [effect.id for effect in self._candidates]
+        """Number of a candidate in the order of the catalogue, delays last; after them another."""
+        ids = [effect.id for effect in sorted(self._candidates, key=lambda one: one.is_delay)]
         return ids.index(effect_id) if effect_id in ids else len(ids)
 
     def grouped(self, folds: Folds) -> bool:
@@ -278,6 +281,8 @@ class SelectionEngine(ABC):
         ranked = score(
             self.projected(present, noise), present.residual, self.regression.n_observations
         )
+        if self.delays_wait:
+            ranked = [item for item in ranked if not item.candidate.effect.is_delay]
         return admissible(ranked, present.hypothesis, self.regression.n_observations)
 
     def pairs(self, present: Fit, noise: Noise) -> list[Pair]:

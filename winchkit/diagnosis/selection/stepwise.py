@@ -19,6 +19,7 @@ from itertools import dropwhile
 
 import numpy as np
 
+from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
 from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
@@ -192,6 +193,19 @@ def _imitates_rest(
         return False
     before, left, after = (excess({o: e[o] for o in own}, noise.rms) for e in errors)
     return left <= _REST * before and after > _LEFT_OF_REST * (left - after)
+
+
+def with_delays(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """The model with delays where they are accepted and its effects do not imitate them."""
+    engine.delays_wait = False
+    while True:
+        delays = [s for s in engine.scores(present, noise) if s.candidate.effect.is_delay]
+        trials = [engine.trial(present, item, noise) for item in delays if item.net_gain > 0]
+        larger = best_accepted(engine, present, noise, trials)
+        last = len(present.hypothesis.terms)
+        if larger is None or collinearity(engine.regression, larger, noise, last) > COLLINEAR_DELAY:
+            return present, noise
+        present, noise = engine.fit_with_noise(larger.hypothesis, noise)
 
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:

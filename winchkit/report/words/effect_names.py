@@ -113,6 +113,10 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "viscous friction by direction",
         "the viscous friction of the motor side depends on the direction",
     ),
+    "prediction-delay": (
+        "time shift of the predicted torque",
+        "the predicted torque is shifted in time",
+    ),
     "pulley-capstan": (
         "capstan friction at a pulley",
         "the cable slides around a blocked pulley (capstan friction)",
