@@ -17,7 +17,7 @@ export function update(state) {
   const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.compared, state.beside, !state.diagnosis && Boolean(state.busy)]);
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
-  const others = view && JSON.stringify(view.runs) !== JSON.stringify(state.runs);
+  const others = view && view.runs.length > 0 && JSON.stringify(view.runs) !== JSON.stringify(state.runs);
   view = state;
   if (same) { busy(); return; }
   root.dataset.signature = signature;
@@ -83,7 +83,7 @@ function context() {
     el("span", { class: "label" }, "Profile"), profile,
     view.winch ? el("span", { class: "label" }, `Winch ${view.winch}`) : null,
     el("span", { class: "row end" },
-      view.beside ? [el("button", { onclick: () => attempt(() => order("swap")) }, "Swap sides"), el("button", { onclick: () => attempt(async () => { await order("end"); address(); }) }, "End comparison")]
+      view.beside ? [el("button", { onclick: () => attempt(() => order("swap")) }, "Swap sides"), el("button", { onclick: () => attempt(() => order("end")) }, "End comparison")]
         : el("button", { disabled: !view.diagnosis || Boolean(view.busy), onclick: () => chooseBeside() }, "Compare…"),
       view.simulated ? el("button", { disabled: !view.diagnosis, onclick: () => attempt(async () => dialog("What the simulated bench hides", el("p", {}, (await ask("/api/truth")).truth))) }, "Reveal…") : null,
       el("button", { disabled: !view.can_undo || Boolean(view.busy), onclick: () => attempt(() => order("undo")) }, "Undo"),
@@ -219,8 +219,8 @@ export function restore(parts) {
 const besideOf = ({ profile, beside }) => (beside.profile.name === profile.name ? String(beside.profile.added.length) : beside.profile.name);
 let asked = null;
 function compareAgain() {
-  if (view.beside) { asked = null; address(); return; }
-  if (!asked || !view.diagnosis || view.busy) return;
+  if (view.beside || !asked) { asked = null; address(); return; }
+  if (!view.diagnosis || view.busy) return;
   const profile = /^\d+$/.test(asked) ? Number(asked) : asked;
   asked = null;
   attempt(() => order("compare", { profile, runs: view.runs.filter((run) => run.used).map((run) => run.name) }));

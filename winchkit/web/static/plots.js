@@ -56,15 +56,15 @@ function marks(runs) {
     ctx.save();
     ctx.strokeStyle = colour("edge"); ctx.fillStyle = colour("muted"); ctx.lineWidth = devicePixelRatio; ctx.setLineDash([1.5 * devicePixelRatio, 3 * devicePixelRatio]);
     ctx.font = `${12 * devicePixelRatio}px Inter, system-ui, sans-serif`;
-    let free = -1;
     ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
-    for (const run of runs) {
-      const x = u.valToPos(run.at, "x", true);
-      if (x < bbox.left - 1 || x > bbox.left + bbox.width) continue;
-      ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-      const width = ctx.measureText(run.name).width;
-      if (x > free && x + width < bbox.left + bbox.width && run.labelled) { ctx.fillText(run.name, x + 3 * devicePixelRatio, bbox.top - 5 * devicePixelRatio); free = x + width + 12 * devicePixelRatio; }
-    }
+    const right = bbox.left + bbox.width, gap = 3 * devicePixelRatio;
+    runs.forEach((run, i) => {
+      const x = u.valToPos(run.at, "x", true), from = Math.max(x, bbox.left), to = i + 1 < runs.length ? Math.min(right, u.valToPos(runs[i + 1].at, "x", true)) : right;
+      if (x >= bbox.left - 1 && x <= right) { ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke(); }
+      // Where the name has no room its load stays.
+      const words = run.labelled ? [run.name, (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0]].find((text) => text && ctx.measureText(text).width + 2 * gap < to - from) : null;
+      if (words) ctx.fillText(words, from + gap, bbox.top - 5 * devicePixelRatio);
+    });
     ctx.restore();
   };
 }
