@@ -46,7 +46,9 @@ def diagnose(page: Any, url: str) -> None:
     page.goto(url)
     page.wait_for_selector("#card .primary", timeout=120_000)
     page.wait_for_timeout(2000)
-    box = page.locator("#over .u-over").first.bounding_box()
+    residual = page.locator("#over .u-over").first
+    residual.scroll_into_view_if_needed()
+    box = residual.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 20)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 30, steps=5)
