@@ -181,7 +181,7 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
 
 
 def saved_as(page: Any, name: str, kind: str, folder: Path) -> Path:
-    """A file that the menu of a plot saves; a key before it, since a choice by script is no user's."""
+    """A file that the menu of a plot saves; the key before it makes it a choice of a user."""
     menu = page.locator(f"[aria-label='Save {name}']")
     with page.expect_download() as waiting:
         menu.press("Home")
