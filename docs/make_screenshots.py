@@ -29,10 +29,10 @@ TRIES = 5
 
 
 @contextmanager
-def served(*arguments: str) -> Iterator[str]:
-    """URL of a page that is served while the block runs."""
+def served(folder: str, *arguments: str) -> Iterator[str]:
+    """URL of a page that is served while the block runs; its work is in the folder."""
     command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
     try:
         assert process.stdout is not None
         yield process.stdout.readline().strip()
@@ -46,11 +46,14 @@ def diagnose(page: Any, url: str) -> None:
     page.goto(url)
     page.wait_for_selector("#card .primary", timeout=120_000)
     page.wait_for_timeout(2000)
-    box = page.locator("#over .u-over").first.bounding_box()
+    residual = page.locator("#over .u-over").first
+    residual.scroll_into_view_if_needed()
+    box = residual.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 20)
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 30, steps=5)
     page.mouse.up()
+    page.evaluate("scrollTo(0, 0)")  # a full page has its head where it is scrolled to
     page.wait_for_timeout(1500)
 
 
@@ -117,7 +120,7 @@ def main() -> None:
         }
         for name in sys.argv[1:] or views:
             show, arguments = views[name]
-            with served(*arguments) as url:
+            with served(folder, *arguments) as url:
                 page = browser.new_page(viewport=SIZE)
                 show(page, url)
                 page.screenshot(path=PICTURES / f"page-{name}.png", full_page=True)

@@ -79,13 +79,20 @@ def test_a_log_counts_its_rows_and_cycles_and_objects_are_shown(
     name = f"{tmp_path.name}.csv"
     page.fill("[aria-label='Name of the log']", name)
     page.click("#record")
+    page.evaluate("location.hash = '#library'")
     until(page, lambda: " rows" in page.inner_text("#recording"))
+    page.evaluate("location.hash = '#bench'")
     page.click("text=Cycle time")
     until(page, lambda: page.locator("#cycles rect").count() > 0)
     cycles = int(page.inner_text("#cycles p").split()[0])
     until(page, lambda: int(page.inner_text("#cycles p").split()[0]) > cycles + 100)
     page.click("#record")
     until(page, lambda: page.inner_text("#recording") == "")
+    until(
+        page,
+        lambda: f"{name}, " in page.inner_text("#head") and " rows." in page.inner_text("#head"),
+    )
+    assert page.input_value("[aria-label='Name of the log']") == name.replace(".csv", "-2.csv")
     page.click("text=Drive objects")
     until(page, lambda: "6041h" in page.inner_text("#objects"))
     page.click("text=Charts")

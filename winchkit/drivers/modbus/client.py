@@ -49,7 +49,7 @@ _EXCEPTIONS = {
     11: "gateway target silent",
 }
 
-_PORT_ERRORS = (ModbusException, ValueError, *UNPLUGGED)
+_PORT_ERRORS: tuple[type[Exception], ...] = (ModbusException, ValueError, *UNPLUGGED)
 
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 

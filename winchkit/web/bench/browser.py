@@ -89,7 +89,7 @@ class Browser:
         """Answer to the latest order, empty for one that was carried out; each has its number."""
         self.inbox = Inbox()
         self._station: RemoteStation | None = None
-        self._log: tuple[str, float] | None = None
+        self._log: tuple[Path, float] | None = None
         self._counted: dict[str, Any] = {}
         self._tares: dict[str, dict[str, Any]] = {}
         self._started: set[str] = set()
@@ -125,8 +125,9 @@ class Browser:
         """File, time and counters of the log that this browser started."""
         if self._log is None:
             return None
-        file, began = self._log
-        return {"file": file, "seconds": time.monotonic() - began, **self._counted}
+        path, began = self._log
+        seconds = time.monotonic() - began
+        return {"file": path.name, "path": str(path), "seconds": seconds, **self._counted}
 
     def count(self) -> None:
         """Count the rows of the log, and those that it lost."""
@@ -246,7 +247,7 @@ class Browser:
         if path.name != file or path.suffix not in {".csv", ".mcap"}:
             raise UsageError("a log's name has no folder and ends with .csv or .mcap")
         station.start_log(str(path.resolve()))
-        self._log, self._counted = (file, time.monotonic()), {}
+        self._log, self._counted = (path.resolve(), time.monotonic()), {}
 
     def _end_record(self, station: RemoteStation) -> None:
         station.end_log()

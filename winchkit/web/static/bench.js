@@ -161,12 +161,28 @@ const stopButton = () => el("button", { class: "stop", onclick: stop, "aria-keys
 
 function header() {
   const box = document.getElementById("station");
-  if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "tripped", class: "chip trip" }, icon("trip"), "Tripped"), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
+  if (!box.firstChild) { box.append(el("span", { id: "recording", class: "chip recording" }), el("span", { id: "where" }), el("span", { id: "tripped", class: "chip trip" }, icon("trip"), "Tripped"), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
   const state = now();
   box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${lengthOf(state)}` : ""}${old() && picture ? ` · ${ago()}` : ""}`;
+  recording(box.querySelector("#recording"), picture && picture.recording);
   box.querySelector("#tripped").hidden = !tripped().length;
   const role = box.querySelector("#role"), kind = old() ? "unknown" : commands() ? "command" : "watch";
   if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), { unknown: "No values", command: "You command", watch: "Watching" }[kind])); }
+}
+
+// The log under way, in every view; where it is once it has ended, and a free name for the next one.
+let logged = null;
+function recording(chip, log) {
+  const time = log && `${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}`;
+  chip.textContent = log ? `● ${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
+  chip.hidden = !log;
+  if (logged && !log) {
+    alarm(`Recorded: ${logged.path}, ${logged.rows ?? "no"} rows.`, "recorded");
+    logName = logged.file.replace(/(?:-(\d+))?(\.\w+)$/, (all, count, suffix) => `-${Number(count || 1) + 1}${suffix}`);
+    const field = document.querySelector(".context input.file");
+    if (field) field.value = logName;
+  }
+  logged = log;
 }
 
 const words = (state) => said(state, tripped().length > 0);
@@ -215,7 +231,7 @@ function build() {
   fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
     el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => chooseWinch(name) }, name))),
       el("span", { class: "segments", id: "tabs" }, tabs().map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
-      el("span", { class: "row end offers" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
+      el("span", { class: "row end offers" }, el("span", { id: "says", class: "note" }),
         declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
     el("div", { class: `bench-grid${names.length > 1 ? " several" : ""}` },
       el("div", { class: "column" }, el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
@@ -369,7 +385,6 @@ function refresh() {
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
   document.getElementById("says").textContent = picture && picture.commander && !commands() && !old() ? `${picture.commander} commands` : "";
   const log = picture && picture.recording;
-  document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
   const record = document.getElementById("record"), mine = commands() || Boolean(log);
   const named = document.querySelector(".context input.file");
   if (record) { record.hidden = !mine; named.hidden = !mine || Boolean(log); }

@@ -9,18 +9,21 @@ import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
 // The output that the ladder proposes has the focus until another is chosen, and after an addition.
-let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, earlier = null, drawnCurve = null;
+let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, earlier = null, drawnCurve = null, wanted = null;
 
-export function enter(main, state) { root = main; shown = { effect: null, output: null, chosen: false }; brushed = null; waiting = []; update(state); }
+export function enter(main, state) { root = main; shown = wanted || { effect: null, output: null, chosen: false }; wanted = null; brushed = null; waiting = []; update(state); }
 
 export function update(state) {
   const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.compared, state.beside, !state.diagnosis && Boolean(state.busy)]);
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
+  const others = view && view.runs.length > 0 && JSON.stringify(view.runs) !== JSON.stringify(state.runs);
   view = state;
   if (same) { busy(); return; }
   root.dataset.signature = signature;
-  cards = {}; span = null;
+  cards = {};
+  if (others) span = null;
+  compareAgain();
   if (state.said) say(state.said);
   render();
 }
@@ -45,15 +48,16 @@ function render() {
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
-    const open = d.patterns.length > 0, next = () => el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" });
+    // Beside a candidate's card stand the ladder and the curves, so that both are seen at a height of 900 px.
+    const open = d.patterns.length > 0, narrow = shown.effect && !open, next = () => el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" });
     root.append(head(d), el("div", { class: "grid" },
       el("section", { class: `panel ${shown.effect || open ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
-      shown.effect && el("section", { class: "panel w4 card", id: "card", "aria-label": "Candidate" }),
+      shown.effect && el("section", { class: `panel w4 card ${narrow ? "tall" : ""}`, id: "card", "aria-label": "Candidate" }),
       open && !shown.effect && next(),
       open && el("section", { class: "panel w8", id: "pattern", "aria-label": "The curve to explain" }),
       open && shown.effect && next(),
-      el("section", { class: "panel w7", id: "time", "aria-label": "Measured and predicted" }),
-      el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
+      el("section", { class: `panel ${narrow ? "w8" : "w7"}`, id: "time", "aria-label": "Measured and predicted" }),
+      el("section", { class: `panel ${narrow ? "w12 low" : "w5"}`, id: "over", "aria-label": "Residual against each variable" }),
       el("section", { class: "panel w12", id: "data" })));
     drawLadder(); drawTime(); drawMultiples(); drawData();
     if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
@@ -191,7 +195,7 @@ function earlierRails() {
 
 function drawLadder() {
   const box = root.querySelector("#ladder"), own = view.diagnosis.ladder, narrow = matchMedia("(max-width: 699px)").matches;
-  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), exporter("ladder", () => ladderFigure(own, source()))),
+  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), exporter("ladder", () => ladderFigure(own, source()), false)),
     narrow ? el("div", { class: "row segments" }, own.columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null,
     ladderGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
 }
@@ -200,8 +204,27 @@ function focusOfSides(output) { shown.output = output; shown.chosen = true; addr
 matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#ladder")) drawLadder(); });
 function focus(output) { shown.output = output; shown.chosen = true; span = null; brushed = null; waiting = []; address(); drawLadder(); drawTime(); drawMultiples(); }
 function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
-function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
-export function restore(parts) { if (parts[0]) { shown.output = parts[0]; shown.chosen = true; } if (parts[1]) shown.effect = parts[1]; }
+// The address: output, candidate, the seconds that are shown, and the profile beside.
+function address() {
+  const beside = view.beside ? besideOf(view) : "", part = span ? span.map((value) => Number(value.toFixed(4))).join("to") : "";
+  history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${[shown.output || "", shown.effect || "", part, beside].map(encodeURIComponent).join("/").replace(/\/+$/, "")}`);
+}
+export function restore(parts) {
+  const [output, effect, part, beside] = parts.map(decodeURIComponent), ends = (part || "").split("to").map(Number);
+  wanted = { output: output || null, effect: effect || null, chosen: Boolean(output) };
+  span = ends.length === 2 && ends[0] < ends[1] ? ends : null;
+  asked = beside || null;
+}
+// The profile beside as a comparison names it: the number of its additions where it is an earlier state of this one.
+const besideOf = ({ profile, beside }) => (beside.profile.name === profile.name ? String(beside.profile.added.length) : beside.profile.name);
+let asked = null;
+function compareAgain() {
+  if (view.beside || !asked) { asked = null; address(); return; }
+  if (!view.diagnosis || view.busy) return;
+  const profile = /^\d+$/.test(asked) ? Number(asked) : asked;
+  asked = null;
+  attempt(() => order("compare", { profile, runs: view.runs.filter((run) => run.used).map((run) => run.name) }));
+}
 
 // "F_c" of a formula as an F with the index c.
 function subscripted(text) {
@@ -238,8 +261,8 @@ async function drawPattern() {
     const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
     fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
     const { columns } = sorted(found.x, found.residual);
-    plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic,
-      traces: [{ x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
+    plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic, names: ["residual"], unit: found.unit,
+      traces: [{ name: "mean", x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ name: "law", x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
     const way = (head, words, button) => el("li", {}, el("b", {}, head), el("p", { class: "note" }, words), button), busy = Boolean(view.busy);
     fill(next, el("h2", {}, "What to do next"), el("ol", { class: "ways" },
       found.curve ? way("Take the curve as it is", "The profile then predicts it, without a cause.", el("button", { class: "primary", disabled: busy, onclick: () => add(found.curve) }, "Add the curve")) : null,
@@ -267,8 +290,8 @@ function mixed(x, y, others, marks) {
 
 function drawSignature(host, s) {
   const { columns } = sorted(s.x, s.residual);
-  plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 140, noise: s.noise, xLabel: unitOf(s.label), range: sym(s.residual), logarithmic: s.logarithmic,
-    traces: [{ x: s.bins, y: s.means, tone: "today", width: 2 }, { x: s.bins, y: s.signature, tone: "with", width: 3 }], label: `Residual and signature over ${s.label}` });
+  plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 140, noise: s.noise, xLabel: unitOf(s.label), range: sym(s.residual), logarithmic: s.logarithmic, names: ["residual"], unit: s.unit,
+    traces: [{ name: "mean", x: s.bins, y: s.means, tone: "today", width: 2 }, { name: "signature", x: s.bins, y: s.signature, tone: "with", width: 3 }], label: `Residual and signature over ${s.label}` });
 }
 
 function signatureFigure({ name, signature: s }) {
@@ -292,6 +315,7 @@ async function drawTime() {
     const zoom = (low, high) => {
       span = low === null ? null : [Math.max(data.first, low), Math.min(data.last, high)];
       if (span && span[1] - span[0] > 0.98 * (data.last - data.first)) span = null;
+      address();
       clearTimeout(zoom.timer); zoom.timer = setTimeout(drawTime, 60);
     };
     const marks = data.runs.slice(1).map((run) => run.at), xLabel = "time [s]";
@@ -300,16 +324,16 @@ async function drawTime() {
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
     if (!view.compared) {
       fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}; not compared yet`)), legend(["edge", "measured"])), upper);
-      plot(upper, [data.x, data.measured], [line("ink", 1.6, 0.7)], { height: 120, top: 22, left: 58, runs, zoom, xLabel: "s", sync: "time", label: `${data.name}, measured over time` });
+      plot(upper, [data.x, data.measured], [line("ink", 1.6, 0.7)], { height: 120, top: 22, left: 58, runs, zoom, xLabel: "s", sync: "time", names: ["measured"], unit: data.unit, label: `${data.name}, measured over time` });
       return;
     }
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
-    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, left: 58, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
+    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, left: 58, runs, zoom, sync: "time", names: ["measured", "predicted"], unit: data.unit, label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
-      { height: 200, left: 58, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+      { height: 188, left: 58, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", names: ["residual"], unit: data.residual_unit, label: `Residual of the ${data.name} over time` });
     if (earlier && earlier.curve && earlier.curve.output === output && !span && !marked) {
       const { x, y, worth } = earlier.curve;
       morph(drawn, { x, y: y.map((value) => (value === null ? null : (value * worth) / data.residual_worth)) }, low);
@@ -333,7 +357,7 @@ async function drawMultiples() {
       grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", { class: "share" }, `${Math.round(100 * panel.share)} %`)), host));
       const { index, columns: data } = sorted(panel.x, found.residual, Array(panel.x.length).fill(null));
       const drawn = plot(host, data, [{ paths: dots("today", 0.28, 2), points: { show: false } }, { paths: dots("brush", 0.9, 3), points: { show: false } }],
-        { height: 120, traces: [{ x: panel.bins, y: panel.means, tone: "today", width: 2 }], noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });
+        { height: 120, names: ["residual"], unit: found.unit, xUnit: unitOf(panel.label), traces: [{ name: "mean", x: panel.bins, y: panel.means, tone: "today", width: 2 }], noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });
       return { drawn, index, data };
     });
   });

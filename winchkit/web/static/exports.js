@@ -1,13 +1,26 @@
 // Exports of drawn figures: CSV of the values, SVG as drawn in the light theme, PNG at twice the size.
 import { el, keep } from "./page.js";
+import { freed, holds } from "./plots.js";
 
 export const LIGHT = { surface: "#FFFFFF", ink: "#12161C", ink2: "#414B58", muted: "#5F6B79", line: "#DDE2E8", edge: "#858F9C", today: "#C2500F", with: "#0B4A8A", band: "#E4E8ED", brush: "#7B2FA8", action: "#1D4F91", stop: "#C5221A", ok: "#14693A", warn: "#805300", unknown: "#6A3A96" };
 
 // `columns` are pairs of a name and its values; `source` says profile and runs when it is asked.
 export function drawingExporter(name, title, node, source, columns) {
-  const button = (kind) => el("button", { class: "plain", onclick: () => saved(kind, name, title, () => node, source(), columns), "aria-label": `Save ${name} as ${kind}` }, kind);
-  return el("span", { class: "exports" }, button("PNG"), button("SVG"), button("CSV"));
+  return menu(name, (kind) => saved(kind, name, title, () => node, source(), columns));
 }
+
+// The one menu of a panel: its exports, and for `axes` whether its plots keep their y range.
+export function menu(name, save, axes = false) {
+  const plots = (box) => [...(box.closest("section") || document).querySelectorAll(".plot")];
+  const act = ({ target }) => {
+    const kind = target.value;
+    target.value = "";
+    if (kind === HOLD) plots(target).forEach(holds); else if (kind === FREE) plots(target).forEach(freed); else save(kind, plots(target));
+  };
+  return el("select", { class: "exports", "aria-label": `Save ${name}`, onchange: act }, el("option", { value: "" }, "Export…"), ["PNG", "SVG", "CSV"].map((kind) => el("option", {}, kind)),
+    axes ? el("optgroup", { label: "y axis" }, [HOLD, FREE].map((words) => el("option", {}, words))) : null);
+}
+const HOLD = "Keep this range", FREE = "Fit to the values";
 
 // Keeps a drawing, which `draw` makes, or its values.
 export function saved(kind, name, title, draw, source, columns) {

@@ -1,14 +1,19 @@
 // Exports of plots: panels of curves and points as CSV, SVG and PNG at twice the size, light theme.
 // A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and
 // marks, or names of rows in place of a vertical axis.
-import { el, keep, number, svg } from "./page.js";
-import { saved } from "./exports.js";
+import { number, svg } from "./page.js";
+import { menu, saved } from "./exports.js";
+import { heldRange } from "./plots.js";
 
 const GAP = 30, BOTTOM = 40, TOP = 26;
 
-export function exporter(name, describe) {
-  const button = (kind) => el("button", { class: "plain", onclick: () => save(kind, name, describe()), "aria-label": `Save ${name} as ${kind}` }, kind);
-  return el("span", { class: "exports" }, button("PNG"), button("SVG"), button("CSV"));
+// The panels of a figure are drawn in the range that the plots of its section keep.
+export function exporter(name, describe, axes = true) {
+  return menu(name, (kind, plots) => {
+    const figure = describe();
+    figure.panels.forEach((panel, i) => { if (plots[i]) panel.range = heldRange(plots[i]) || panel.range; });
+    save(kind, name, figure);
+  }, axes);
 }
 
 function save(kind, name, figure) {

@@ -12,14 +12,19 @@ let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new S
 
 export function enter(main, fresh) { root = main; state = fresh; root.removeAttribute("data-signature"); load(); }
 export function update(fresh) { const before = state; state = fresh; if (part === "fleet") fleet.update(fresh, before); }
-export function restore(parts) { part = parts[0] === "fleet" ? "fleet" : "runs"; }
+export function restore(parts) {
+  const [kind, words, judgement, shown] = parts.map(decodeURIComponent);
+  part = kind === "fleet" ? "fleet" : "runs"; filter = words || ""; verdict = judgement || ""; channel = shown || channel;
+}
+// The address: runs or fleet, the filter, the verdict, and the channel that is laid over.
+function address() { history.replaceState(null, "", `${location.pathname}${location.search}#library/${part === "fleet" ? "fleet" : ["runs", filter, verdict, channel].map(encodeURIComponent).join("/")}`); }
 
 async function load() {
   fill(root, el("div", { class: "row context" }, el("span", { class: "label" }, "Reading the folder")));
   await attempt(async () => { found = await ask("/api/runs"); render(); });
 }
 
-function show(next) { part = next; history.replaceState(null, "", `${location.pathname}${location.search}#library${part === "fleet" ? "/fleet" : ""}`); render(); }
+function show(next) { part = next; address(); render(); }
 
 function render() {
   const tabs = el("span", { class: "row segments tabs" }, [["runs", "Runs"], ["fleet", "Fleet"]].map(([name, words]) => el("button", { "aria-pressed": String(part === name), onclick: () => show(name) }, words)));
@@ -27,11 +32,11 @@ function render() {
   const channels = [...new Set(found.runs.flatMap((run) => run.channels || []))];
   if (!channels.includes(channel) && channels.length) channel = channels[0];
   const body = el("tbody", {}, rows());
-  const again = () => fill(body, ...rows());
+  const again = () => { address(); fill(body, ...rows()); };
   const search = el("input", { type: "search", placeholder: "filter: name, load, winch, date", value: filter, "aria-label": "Filter runs", oninput: () => { filter = search.value; again(); } });
   const verdicts = [...new Map(found.runs.filter((run) => run.verdict).map((run) => [run.verdict.verdict, run.verdict.chip]))];
   const judged = verdicts.length ? el("select", { "aria-label": "Verdict", onchange: () => { verdict = judged.value; again(); } }, [["", "any verdict"], ...verdicts].map(([value, words]) => el("option", { value, selected: value === verdict }, words))) : null;
-  const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
+  const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; address(); overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
   const readable = found.runs.filter((run) => !run.fault).length;
   const outputs = [...new Set(found.runs.flatMap((run) => (run.verdict ? Object.keys(run.verdict.ratios) : [])))];
   fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${readable} run${readable === 1 ? "" : "s"} in ${sets().length} set${sets().length === 1 ? "" : "s"}`), search, judged,
@@ -127,11 +132,11 @@ async function overlay() {
       el("h3", { class: "row" }, `${words[0].toUpperCase()}${words.slice(1)}`, el("span", { class: "note" }, `${lines[0].unit}, each from its own start${chosen.size > TONES.length ? `, the first ${TONES.length}` : ""}`), exporter(`overlay-${channel}`, figure)), host);
     const data = uPlot.join(lines.map((own) => [own.x, own.y]));
     const style = (i) => line(TONES[i % TONES.length], 1.4, 1, { spanGaps: true, ...(i >= TONES.length / 2 ? { dash: [6, 3] } : {}) });
-    plot(host, data, lines.map((_, i) => style(i)), { height: difference ? 200 : 320, xLabel: "s", label: `${channel} of ${lines.length} runs over time` });
+    plot(host, data, lines.map((_, i) => style(i)), { height: difference ? 200 : 320, xLabel: "s", sync: "library", names: lines.map((own) => own.name.split("/").at(-1)), unit: lines[0].unit, label: `${channel} of ${lines.length} runs over time` });
     if (!difference) return;
     const below = el("div", { class: "plot" });
     box.append(el("h3", { class: "row" }, "Difference", el("span", { class: "note" }, `${difference.unit}, ${difference.name}`)), below);
-    plot(below, [difference.x, difference.y], [line("ink", 1.4)], { height: 140, xLabel: "s", label: `Difference of the ${channel} over time` });
+    plot(below, [difference.x, difference.y], [line("ink", 1.4)], { height: 140, xLabel: "s", sync: "library", names: ["difference"], unit: difference.unit, label: `Difference of the ${channel} over time` });
   });
 }
 

@@ -56,15 +56,15 @@ function marks(runs) {
     ctx.save();
     ctx.strokeStyle = colour("edge"); ctx.fillStyle = colour("muted"); ctx.lineWidth = devicePixelRatio; ctx.setLineDash([1.5 * devicePixelRatio, 3 * devicePixelRatio]);
     ctx.font = `${12 * devicePixelRatio}px Inter, system-ui, sans-serif`;
-    let free = -1;
     ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
-    for (const run of runs) {
-      const x = u.valToPos(run.at, "x", true);
-      if (x < bbox.left - 1 || x > bbox.left + bbox.width) continue;
-      ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
-      const width = ctx.measureText(run.name).width;
-      if (x > free && x + width < bbox.left + bbox.width && run.labelled) { ctx.fillText(run.name, x + 3 * devicePixelRatio, bbox.top - 5 * devicePixelRatio); free = x + width + 12 * devicePixelRatio; }
-    }
+    const right = bbox.left + bbox.width, gap = 3 * devicePixelRatio;
+    runs.forEach((run, i) => {
+      const x = u.valToPos(run.at, "x", true), from = Math.max(x, bbox.left), to = i + 1 < runs.length ? Math.min(right, u.valToPos(runs[i + 1].at, "x", true)) : right;
+      if (x >= bbox.left - 1 && x <= right) { ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke(); }
+      // Where the name has no room its load stays.
+      const words = run.labelled ? [run.name, (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0]].find((text) => text && ctx.measureText(text).width + 2 * gap < to - from) : null;
+      if (words) ctx.fillText(words, from + gap, bbox.top - 5 * devicePixelRatio);
+    });
     ctx.restore();
   };
 }
@@ -104,10 +104,31 @@ export function dots(tone, alpha, size = 3) {
   };
 }
 
-// One plot; `more` are options of uPlot that replace these.
-export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, left = 0, label }) {
+// y ranges that are kept, by the plot's label: they outlive its drawing.
+const held = new Map(), drawnIn = new WeakMap();
+const labelOf = (host) => host.getAttribute("aria-label");
+export const heldRange = (host) => held.get(labelOf(host)) || null;
+export function holds(host) { const { min, max } = drawnIn.get(host).scales.y; held.set(labelOf(host), [min, max]); }
+export function freed(host) { held.delete(labelOf(host)); const u = drawnIn.get(host), { min, max } = u.scales.x; u.setData(u.data, false); u.setScale("x", { min, max }); }
+
+// Beside the pointer: the place, the value of each of `names` there, and the run; `traces` by their bins.
+function readout(box, { xLabel, names, unit, runs, traces }) {
+  const nearest = (xs, x) => xs.reduce((best, value, i) => (Math.abs(value - x) < Math.abs(xs[best] - x) ? i : best), 0);
+  return (u) => {
+    const { left, idx } = u.cursor, inside = left >= 0 && idx !== null && idx !== undefined;
+    box.hidden = !inside;
+    if (!inside) return;
+    const x = u.data[0][idx], run = runs.findLast((one) => one.at <= x);
+    const values = [...names.map((name, i) => [name, (u.data[i + 1] || [])[idx], u.series[i + 1].show]), ...traces.filter(({ name }) => name).map(({ name, x: xs, y }) => [name, y[nearest(xs, x)], true])];
+    box.textContent = [`${number(x, 5)} ${xLabel}`, ...values.filter(([, value, shown]) => shown && value !== null && value !== undefined).map(([name, value]) => `${name} ${number(value, 5)} ${unit}`), run ? run.name : ""].filter(Boolean).join(" · ");
+    box.style.cssText = left < u.over.clientWidth / 2 ? "right: 10px" : `left: ${u.over.offsetLeft + 4}px`;
+  };
+}
+
+// One plot; `names` of its series and their `unit` are for the read-out.
+export function plot(host, data, series, { names = [], unit = "", height, xLabel = "", xUnit = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, left = 0, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
-  const flat = height < 130;
+  const flat = height < 130, shown = el("div", { class: "readout", hidden: true });
   const chosen = (u) => {
     if (u.select.width < 3) return;
     const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");
@@ -116,17 +137,19 @@ export function plot(host, data, series, { height, xLabel = "", noise = null, ru
   const options = {
     width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, bare ? 8 : 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
-    scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
+    scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: { range: (u, low, high) => held.get(label) || (range ? range(u, low, high) : low === null ? [null, null] : uPlot.rangeNum(low, high, 0.1, true)) } },
     axes: axes(xLabel, logarithmic, flat, left).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],
     hooks: {
       drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
-      setSelect: [(u) => chosen(u)],
+      setSelect: [(u) => chosen(u)], setCursor: [readout(shown, { xLabel: xLabel || xUnit || (bare ? "s" : ""), names, unit, runs, traces })],
     },
   };
   host.setAttribute("role", "img");
   host.setAttribute("aria-label", label);
   host.replaceChildren();
   const drawn = new uPlot(options, data, host);
+  host.append(shown);
+  drawnIn.set(host, drawn);
   if (zoom) gestures(drawn, zoom);
   if (select || zoom) touched(drawn, chosen);
   if (select) typed(host, drawn, chosen);

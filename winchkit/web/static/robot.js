@@ -6,6 +6,12 @@ let bench = null, drawnAt = 0, root = null, view = null, now = null, newest = nu
 
 export function enter(main, state) { root = main; signature = null; update(state); }
 export function leave() { root = null; }
+// The address: pose (or live), height of the slice, side that is looked at.
+let wanted = null, scrolled = false;
+export function restore(parts) {
+  const [row, z, side] = parts.map(decodeURIComponent);
+  wanted = row === undefined || row === "" ? null : { row: row === "live" ? "live" : Math.max(0, Number(row) || 0), z: z && Number.isFinite(Number(z)) ? Number(z) : null, side: side in SIDES ? side : "Iso" };
+}
 
 export function update(state) {
   newest = state;
@@ -32,6 +38,7 @@ async function read() {
       alarm("", "robot");
       if (!view || next.name !== view.name) { shown = { row: now ? "live" : 0, side: "Iso", z: null, limits: next.limits }; slice = null; }
       view = next;
+      if (wanted) { shown = { ...shown, ...wanted }; wanted = null; }
       if (shown.row !== "live") shown.row = Math.min(shown.row, view.poses);
       await fetchPicture();
       if (root && newest.robot) render(newest);
@@ -110,6 +117,8 @@ function render(state) {
   drawPicture();
   drawnAt = 0; drawPlatform();
   if (found) drawDetails(found);
+  const next = root.querySelector("[aria-label='Poses to measure next']");
+  if (scrolled && next && !state.busy) { scrolled = false; next.scrollIntoView({ block: "center" }); }
 }
 
 function context(state) {
@@ -119,7 +128,7 @@ function context(state) {
     el("span", { class: "label" }, "Robot"), el("button", { onclick: chooseProfile }, el("b", {}, view.name), el("span", { class: "note" }, `${view.lines.length} cables, ${number(view.mass, 3)} kg platform`)),
     el("span", { class: "label" }, "Poses"), el("button", { onclick: choosePoses }, el("b", {}, view.poses ? `${view.poses - view.held_out} to fit` : "choose…"), view.poses ? el("span", { class: "note" }, `${view.held_out} held out`) : null),
     el("span", { class: "row end" },
-      el("button", { disabled: busy || without, onclick: () => attempt(() => order("propose")) }, "Propose poses"),
+      el("button", { disabled: busy || without, onclick: () => attempt(async () => { scrolled = true; await order("propose"); }) }, "Propose poses"),
       el("button", { disabled: busy || without || Boolean(view.calibration.refused), onclick: () => attempt(() => download("/api/robot/profile")) }, "Save profile"),
       el("button", { disabled: busy || without, onclick: () => attempt(() => download("/api/robot/report")) }, "Report"),
       el("button", { disabled: without, onclick: () => dialog("Commands", el("pre", {}, view.command)) }, "Commands")));
@@ -248,6 +257,7 @@ function drawPicture() {
       el("label", {}, el("span", { class: "note" }, height), z),
       view.poses ? el("label", {}, el("span", { class: "note" }, shown.row === "live" ? `Now; ${view.poses} poses` : shown.row === 0 ? `Home; ${view.poses} poses` : `Pose ${shown.row} of ${view.poses}`), el("input", { type: "range", id: "row", min: 0, max: view.poses, value: shown.row === "live" ? 0 : shown.row, "aria-label": "Pose", onchange: (event) => { shown.row = Number(event.target.value); attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } })) : null));
   if (focus) box.querySelector(`#${focus}`)?.focus();
+  history.replaceState(null, "", `${location.pathname}${location.search}#robot/${shown.row}/${number(shown.z).replace("−", "-")}/${shown.side}`);
 }
 
 function bounds() {

@@ -78,8 +78,8 @@ async function drawTimes(view, output, boxes) {
         panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
           { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, label, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], [tone, "predicted, residual"], ["band", "noise ±1σ", true]), exporter(`${output}-over-time-${"ab"[i]}`, figure)), upper, lower);
-      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, left: 58, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", label: `${label}, measured and predicted over time` });
-      plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, left: 58, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", label: `${label}, residual over time` });
+      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, left: 58, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", names: ["measured", "predicted"], unit: data.unit, label: `${label}, measured and predicted over time` });
+      plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, left: 58, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", names: ["residual"], unit: data.residual_unit, label: `${label}, residual over time` });
     });
   });
 }
@@ -100,7 +100,7 @@ async function drawOver(view, output, boxes) {
         const host = el("div", { class: "plot" }), { columns } = sorted(panel.x, own.residual), known = pair.filter(Boolean);
         const same = known.every((each) => each.label === known[0].label) ? ends(known.flatMap((each) => each.x)) : null;
         grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", { class: "share" }, `${Math.round(100 * panel.share)} %`)), host));
-        plot(host, columns, [{ paths: dots(tone, 0.28, 2), points: { show: false } }], { height: 130, traces: [{ x: panel.bins, y: panel.means, tone, width: 2 }], noise: own.noise, range, xRange: panel.logarithmic ? null : same, logarithmic: panel.logarithmic, label: `${"AB"[i]}: residual over ${panel.label}` });
+        plot(host, columns, [{ paths: dots(tone, 0.28, 2), points: { show: false } }], { height: 130, names: ["residual"], unit: own.unit, traces: [{ name: "mean", x: panel.bins, y: panel.means, tone, width: 2 }], noise: own.noise, range, xRange: panel.logarithmic ? null : same, logarithmic: panel.logarithmic, label: `${"AB"[i]}: residual over ${panel.label}` });
       }
     });
   });

@@ -64,7 +64,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       if (residual) columns.push(now.rows.map(() => noise), now.rows.map(() => (noise === null ? null : -noise)));
       return [now.rows.map((row) => row.time - end), ...columns];
     };
-    const own = plot(host, data(), series, { height: axis ? 96 : 72, left: LEFT, label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
+    const own = plot(host, data(), series, { height: axis ? 96 : 72, left: LEFT, names, unit: CHANNELS[names[0]].unit.split(",")[0], sync: "strips", label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
     const top = names[0] === "tension" ? limits.tension : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
     const beyond = last.parentElement.querySelector(".beyond");
     drawn.push(() => {

@@ -1,0 +1,149 @@
+"""Plots in Chromium: read-out, kept ranges, the address, sizes of first screen and targets."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip("starlette")
+pytest.importorskip("playwright.sync_api")
+
+from browsing import Served, number, opened, until
+from chromium import NEEDS_CHROMIUM
+
+pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
+SMALL = """() => [...document.querySelectorAll("button, select, input, a, summary")]
+    .filter((one) => one.getClientRects().length && !one.classList.contains("visually-hidden"))
+    .filter((one) => one.getBoundingClientRect().height < 44)
+    .map((one) => one.textContent || one.getAttribute("aria-label"))"""
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    found = Served("--mystery", "1")
+    yield found
+    found.end()
+
+
+def diagnosed(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
+    page, complaints = opened(browser, url, accept_downloads=True, **options)
+    until(page, lambda: page.locator("#time .u-over").count() == 2)
+    until(page, lambda: page.locator("#card .u-over").count() == 1)
+    return page, complaints
+
+
+def readouts(page: Any) -> list[str]:
+    return [str(text) for text in page.locator("#time .readout:visible").all_inner_texts()]
+
+
+def test_the_pointer_reads_value_unit_time_and_run_in_both_plots(
+    browser: Any, served: Served
+) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
+    box = page.locator("#time .u-over").first.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 20)
+    until(page, lambda: len(readouts(page)) == 2)
+    upper, lower = (text.split(" · ") for text in readouts(page))
+    asked = "`/api/curve${location.search}&output=cable_length&points=1480`"
+    curve = page.evaluate(f"fetch({asked}).then((answer) => answer.json())")
+    time = number(upper[0])
+    assert upper[0].endswith(" s")
+    assert lower[0] == upper[0]
+    known = [(abs(t - time), v) for t, v in zip(curve["x"], curve["measured"], strict=True) if v]
+    assert number(upper[1].removeprefix("measured ")) == pytest.approx(min(known)[1], rel=0.02)
+    assert upper[1].endswith(f" {curve['unit']}")
+    assert upper[2].startswith("predicted ")
+    assert lower[1].startswith("residual ")
+    assert lower[1].endswith(f" {curve['residual_unit']}")
+    (name,) = {run["name"] for run in curve["runs"] if run["at"] <= time} & {upper[-1]}
+    assert lower[-1] == name
+    page.mouse.move(5, 5)
+    until(page, lambda: readouts(page) == [])
+    assert complaints == []
+    page.context.close()
+
+
+def ticks(page: Any, name: str, path: Path) -> list[str]:
+    """y ticks of the first panel of an exported drawing."""
+    with page.expect_download() as waiting:
+        page.select_option(f"[aria-label='Save {name}']", "SVG")
+    waiting.value.save_as(path)
+    panel = ElementTree.parse(path).getroot().find(".//{*}g/{*}g")
+    assert panel is not None
+    return [str(text.text) for text in panel.iter() if text.get("text-anchor") == "end"]
+
+
+def test_a_kept_range_outlives_a_zoom_and_is_that_of_the_exports(
+    browser: Any, served: Served, tmp_path: Path
+) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
+    name = "cable_length-over-time"
+    menu = f"[aria-label='Save {name}']"
+    page.select_option(menu, "Keep this range")
+    before = ticks(page, name, tmp_path / "before.svg")
+    box = page.locator("#time .u-over").first.bounding_box()
+    page.mouse.move(box["x"] + 0.95 * box["width"], box["y"] + 20)
+    for _ in range(8):
+        page.mouse.wheel(0, -300)
+        page.wait_for_timeout(250)
+    until(page, lambda: page.locator("text=Whole record").count() == 1)
+    assert ticks(page, name, tmp_path / "kept.svg") == before
+    page.select_option(menu, "Fit to the values")
+    assert ticks(page, name, tmp_path / "free.svg") != before
+    assert complaints == []
+    page.context.close()
+
+
+def test_the_address_has_zoom_comparison_filter_and_channel(browser: Any, served: Served) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose/tension//5to20")
+    until(page, lambda: page.locator("text=Whole record").count() == 1)
+    assert "Tension" in page.inner_text("#time h2")
+    assert re.search(r"#diagnose/tension/[\w-]*/5to20$", page.url)
+    page.evaluate("location.hash = '#library'")
+    until(page, lambda: page.locator("table.library tr").count() > 3)
+    page.fill("[aria-label='Filter runs']", "slow")
+    page.select_option("[aria-label=Channel]", "motor_torque")
+    shown = page.locator("table.library tr").count()
+    assert "/slow/" in page.url
+    page.reload()
+    until(page, lambda: page.locator("table.library tr").count() == shown)
+    assert page.input_value("[aria-label='Filter runs']") == "slow"
+    assert page.input_value("[aria-label=Channel]") == "motor_torque"
+    page.goto("about:blank")
+    page.goto(f"{served.url}#diagnose/cable_length///0")
+    until(page, lambda: page.locator("#ladder-b").count() == 1)
+    assert page.url.endswith("/0")
+    page.click("text=End comparison")
+    until(page, lambda: page.locator("#ladder").count() == 1)
+    until(page, lambda: not page.url.endswith("/0"))
+    assert complaints == []
+    page.context.close()
+
+
+def test_verdict_ladder_and_residual_are_seen_at_a_height_of_900(
+    browser: Any, served: Served
+) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
+    box = page.locator("#time .plot").nth(1).bounding_box()
+    assert box["y"] + box["height"] <= 900
+    heights = {row.bounding_box()["height"] for row in page.locator(".ladder .name").all()}
+    assert heights == {27}
+    assert complaints == []
+    page.context.close()
+
+
+@pytest.mark.parametrize("view", ["diagnose", "library"])
+def test_targets_of_a_phone_are_44_px_high(browser: Any, served: Served, view: str) -> None:
+    size = {"width": 390, "height": 844}
+    page, complaints = opened(browser, f"{served.url}#{view}", viewport=size)
+    ready = {"diagnose": "#card .u-over", "library": "table.library tr.set"}[view]
+    until(page, lambda: page.locator(ready).count() == 1)
+    assert page.evaluate(SMALL) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == size["width"]
+    assert complaints == []
+    page.context.close()
