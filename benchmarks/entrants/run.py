@@ -44,7 +44,7 @@ def main() -> int:
                 path.write_text(json.dumps(seconds | answer), encoding="utf-8")
                 print(folder.name, name, answer["verdict"], file=sys.stderr, flush=True)
             done.touch()
-    return enter(["score", str(args.folder)])
+    return enter(["score", str(args.folder), "--cases", args.cases])
 
 
 if __name__ == "__main__":
