@@ -37,7 +37,7 @@ def share(form: str, speed: Array, scale: float) -> Array:
 
 
 def held(speed: Array, scale: float) -> Array:
-    """Coulomb friction whose force stays at standstill: the load leans on the contact."""
+    """Coulomb friction that keeps its force at standstill, as a loaded contact does."""
     moving = np.abs(speed) > scale / 10
     last = np.maximum.accumulate(np.where(moving, np.arange(len(speed)), 0))
     return np.where(moving.any() & (last > 0), np.sign(speed[last]), 0.0)
