@@ -27,6 +27,7 @@ OUTSIDE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
+    "benchmarks/missing_physics/README.md": "missing-physics.md",
     ".github/SECURITY.md": "security.md",
 }
 """Pages outside docs/, and their names on the site."""

@@ -27,6 +27,6 @@ def answers(case: Case) -> Iterator[tuple[str, dict[str, Any]]]:
             "verdict": "unknown" if is_open else VERDICTS.get(answer.diagnosis.verdict, "unknown"),
             "effects": [{"names": list(s.effects), "certain": s.certain} for s in steps],
             "predicted": case.predicted(case.change(model)),
-            "told": answer.diagnosis.verdict,
+            "verdict of winchkit": answer.diagnosis.verdict,
         },
     )

@@ -28,11 +28,12 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", default="1")
     parser.add_argument("--cases", default="200", help="only the first of them")
+    parser.add_argument("--only", choices=MODULES, action="append", help="one kind of entrants")
     args = parser.parse_args()
     if not (args.folder / "cases").exists():
         enter(["write", str(args.folder), "--seed", args.seed, "--cases", args.cases])
     for folder in sorted((args.folder / "cases").iterdir())[: int(args.cases)]:
-        for module in MODULES:
+        for module in args.only or MODULES:
             done = args.folder / "answers" / f"{folder.name}-{module}.done"
             if done.exists():
                 continue
@@ -44,7 +45,7 @@ def main() -> int:
                 path.write_text(json.dumps(seconds | answer), encoding="utf-8")
                 print(folder.name, name, answer["verdict"], file=sys.stderr, flush=True)
             done.touch()
-    return enter(["score", str(args.folder)])
+    return enter(["score", str(args.folder), "--cases", args.cases])
 
 
 if __name__ == "__main__":

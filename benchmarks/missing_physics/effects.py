@@ -57,6 +57,7 @@ class State:
 Parameters = dict[str, float]
 """Of one hidden effect; ``size`` among them."""
 Added = Callable[[State, Parameters], Array]
+Drawn = Callable[[Random, Motion], Parameters]
 STAGES = ("drum", "wound", "tension", "torque", "length", "counter", "cell", "signal")
 QUANTITY = {
     **{"drum": "drum", "wound": "wound", "tension": "tension", "cell": "tension"},
@@ -79,7 +80,7 @@ class Effect:
     where: str = "both"
     """``winch``, ``axis``, ``both``; ``gear``, ``layers``, ``warm``: winches that have it;
     ``slow``: the samples resolve an order of the motor angle."""
-    drawn: Callable[[Random, Motion], Parameters] = lambda _random, _motion: {}
+    drawn: Drawn = lambda _random, _motion: {}
     """Its other parameters."""
     names: tuple[str, ...] = ()
     """Answers that are right where its own name is none, or not the only one."""
@@ -191,44 +192,38 @@ def pulley_form(name: str) -> Added:
     return lambda s, p: bearing(s) * share(name, s.reel, p["scale"])
 
 
-def phase(random: Random, _run: Motion) -> Parameters:
-    """Any."""
-    return {"phase": random.uniform(0, 2 * pi)}
+def warming(s: State, _p: Parameters) -> Array:
+    """Temperature above 20 °C."""
+    return s.motion.temperature - 20
+
+
+def drawn(**between: tuple[float, float]) -> Drawn:
+    """Parameters uniform between two values."""
+    return lambda random, _run: {name: random.uniform(*ends) for name, ends in between.items()}
+
+
+def spread(low: float, high: float, *, of_speed: bool = False) -> Drawn:
+    """A scale whose logarithm is uniform; of the greatest speed of the motor, or absolute."""
+
+    def scale(random: Random, run: Motion) -> Parameters:
+        unit = float(np.max(np.abs(run.speed))) if of_speed else 1.0
+        return {"scale": unit * float(np.exp(random.uniform(np.log(low), np.log(high))))}
+
+    return scale
+
+
+PHASE = drawn(phase=(0, 2 * pi))
+FAST = spread(0.1, 0.25, of_speed=True)
+"""A Stribeck speed well within those of the run, rad/s."""
+SHARP, SHARP_REEL = spread(3e-4, 0.01, of_speed=True), spread(1e-4, 3e-3)
+"""A reversal within a hundredth of the greatest speed, rad/s; of the cable, m/s."""
+PRESLIDING = spread(0.03, 2.0)
+"""A distance of presliding, rad."""
 
 
 def order(random: Random, run: Motion) -> Parameters:
     """A low order of the motor angle."""
-    return phase(random, run) | {"order": float(random.choice([2, 3, 4]))}
-
-
-def fast(random: Random, run: Motion) -> Parameters:
-    """A Stribeck speed well within those of the run, rad/s."""
-    return {"scale": float(np.max(np.abs(run.speed))) * random.uniform(0.1, 0.25)}
-
-
-def sharp(random: Random, run: Motion) -> Parameters:
-    """A reversal within a hundredth of the greatest speed, rad/s."""
-    return {"scale": float(np.max(np.abs(run.speed))) * 10 ** random.uniform(-3.5, -2)}
-
-
-def sharp_reel(random: Random, _run: Motion) -> Parameters:
-    """The same of the cable, m/s."""
-    return {"scale": 10 ** random.uniform(-4, -2.5)}
-
-
-def presliding(random: Random, _run: Motion) -> Parameters:
-    """A distance of presliding, rad."""
-    return {"scale": 10 ** random.uniform(-1.5, 0.3)}
-
-
-def settling(random: Random, _run: Motion) -> Parameters:
-    """A time constant of creep, s."""
-    return {"time": random.uniform(3, 15)}
-
-
-def warming(s: State, _p: Parameters) -> Array:
-    """Temperature above 20 °C."""
-    return s.motion.temperature - 20
+    return PHASE(random, run) | {"order": float(random.choice([2, 3, 4]))}
 
 
 MOTOR, DRUM = turning(lambda s: s.motion.angle), turning(lambda s: s.drum)
@@ -237,28 +232,32 @@ CATALOGUE: dict[str, Effect] = {
     "gear-ratio": Effect("drum", lambda s, _: -s.drum, 0.003, "gear"),
     "drum-radius": Effect("wound", lambda s, _: s.drum, 0.0003, "winch"),
     "layer-thickness": Effect("wound", layers, 0.0001, "layers"),
-    "drum-eccentricity": Effect("wound", DRUM, 0.0003, "winch", phase),
-    "pulley-coulomb": Effect("tension", pulley_form("tanh"), 0.015, "winch", sharp_reel),
+    "drum-eccentricity": Effect("wound", DRUM, 0.0003, "winch", PHASE),
+    "pulley-coulomb": Effect("tension", pulley_form("tanh"), 0.015, "winch", SHARP_REEL),
     "pulley-viscous": Effect("tension", lambda s, _: s.reel, 20.0, "winch"),
     "pulley-inertia": Effect("tension", lambda s, _: np.gradient(s.reel, 1 / FINE), 1.0, "winch"),
     "cable-weight": Effect("tension", lambda s, _: GRAVITY * s.free, 0.1, "winch"),
     "gear-efficiency": Effect("torque", gear_loss, 0.05, "gear"),
-    "motor-coulomb": Effect("torque", motor_form("tanh"), None, "both", sharp),
+    "motor-coulomb": Effect("torque", motor_form("tanh"), None, "both", SHARP),
     "motor-viscous": Effect("torque", lambda s, _: s.motion.speed),
     "motor-stribeck": Effect(
-        "torque", lambda s, p: stribeck(s.motion.speed, p["scale"]), None, "both", fast
+        "torque", lambda s, p: stribeck(s.motion.speed, p["scale"]), None, "both", FAST
     ),
     "motor-coulomb-asymmetry": Effect("torque", lambda s, _: np.ones_like(s.drum)),
     "motor-cogging": Effect("torque", MOTOR, None, "slow", order),
     "joint-gravity": Effect(
-        "torque", DRUM, None, "axis", phase, ("joint-gravity", "drum-unbalance")
+        "torque", DRUM, None, "axis", PHASE, ("joint-gravity", "drum-unbalance")
     ),
-    "drum-unbalance": Effect("torque", DRUM, None, "winch", phase),
+    "drum-unbalance": Effect("torque", DRUM, None, "winch", PHASE),
     "cable-elongation-linear": Effect("length", lambda s, _: s.stressed * s.tension, 5e-6, "winch"),
     "frame-compliance": Effect("length", lambda s, _: s.tension, 5e-6, "winch"),
     "cable-thermal": Effect("length", lambda s, p: s.stressed * warming(s, p), 1e-5, "warm"),
     "cable-creep": Effect(
-        "length", lambda s, p: s.stressed * lag(s.tension, p["time"]), 1e-6, "winch", settling
+        "length",
+        lambda s, p: s.stressed * lag(s.tension, p["time"]),
+        1e-6,
+        "winch",
+        drawn(time=(3, 15)),
     ),
     "length-time-offset": Effect("counter", late, 0.01, "winch"),
     "cell-gain": Effect("cell", lambda s, _: s.tension, 0.01, "winch"),
@@ -278,14 +277,14 @@ CATALOGUE: dict[str, Effect] = {
 FRICTIONS: dict[str, Effect] = {
     f"motor-friction-{form}": Effect(
         *("torque", motor_form(form), None, "both"),
-        presliding if form == "dahl" else sharp,
+        PRESLIDING if form == "dahl" else SHARP,
         ("motor-coulomb", "motor-dahl"),
     )
     for form in FORMS
 } | {
     f"pulley-friction-{form}": Effect(
         *("tension", pulley_form(form), 0.015, "winch"),
-        sharp_reel,
+        SHARP_REEL,
         ("pulley-coulomb", "pulley-dahl", "pulley-capstan"),
     )
     for form in FORMS
@@ -299,10 +298,10 @@ OUTSIDE: dict[str, Effect] = {
         "signal",
         lambda s, p: np.sin(2 * pi * p["rate"] * s.motion.time + p["phase"]),
         *(None, "both"),
-        lambda random, run: phase(random, run) | {"rate": random.uniform(0.2, 1.5)},
+        drawn(phase=(0, 2 * pi), rate=(0.2, 1.5)),
     ),
     "pulley-runout": Effect(
-        *("counter", turning(lambda s: s.cable_length / PULLEY_RADIUS), 3e-4, "winch"), phase
+        *("counter", turning(lambda s: s.cable_length / PULLEY_RADIUS), 3e-4, "winch"), PHASE
     ),
     "swinging-load": Effect(
         "cell",
@@ -310,7 +309,7 @@ OUTSIDE: dict[str, Effect] = {
             s.tension * np.sin(2 * np.sqrt(GRAVITY / s.machine.length) * s.motion.time + p["phase"])
         ),
         *(0.01, "winch"),
-        phase,
+        PHASE,
     ),
     "magnetic-saturation": Effect(
         "signal",

@@ -39,6 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     scoring = commands.add_parser("score", help="score answers, one table")
     scoring.add_argument("folder", type=Path)
     scoring.add_argument("--truths", type=Path)
+    scoring.add_argument("--cases", type=int, help="only the first of them")
     scoring.add_argument("--json", action="store_true", help="every case, as JSON")
     args = parser.parse_args(arguments)
     truths = args.truths or args.folder / "truths"
@@ -51,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not entrants:
         parser.error(f"{args.folder / 'answers'}: no folder of an entrant there; README.md")
     try:
-        judged = {path.name: score(truths, path) for path in entrants}
+        judged = {path.name: score(truths, path, args.cases) for path in entrants}
     except AnswerError as error:
         print(error, file=sys.stderr)
         return 3

@@ -31,30 +31,23 @@ def share(form: str, speed: Array, scale: float) -> Array:
     if form == "held":
         return held(speed, scale)
     if form == "dahl":
-        return dahl(speed, scale)
-    return lugre(speed, scale / 100, scale)
+        return bristles(speed, scale, np.ones_like(speed))
+    curve = 1 + (STRIBECK - 1) * np.exp(-((speed / scale) ** 2))
+    return bristles(speed, scale / 100, curve)
 
 
 def held(speed: Array, scale: float) -> Array:
-    """Coulomb friction whose force stays at standstill: the load leans on the contact."""
+    """Coulomb friction that keeps its force at standstill, as a loaded contact does."""
     moving = np.abs(speed) > scale / 10
     last = np.maximum.accumulate(np.where(moving, np.arange(len(speed)), 0))
     return np.where(moving.any() & (last > 0), np.sign(speed[last]), 0.0)
 
 
-def dahl(speed: Array, distance: float) -> Array:
-    """dF/dx = (1 − s F)/δ, solved exactly for a constant speed within each step."""
-    decay = np.exp(-np.abs(speed) / (FINE * distance)).tolist()
-    value, out = 0.0, []
-    for s, d in zip(np.sign(speed).tolist(), decay, strict=True):
-        value = s + (value - s) * d if s else value
-        out.append(value)
-    return np.asarray(out)
+def bristles(speed: Array, distance: float, curve: Array) -> Array:
+    """dz/dx = (1 − s z/g)/δ, g the sliding friction: exact for a constant speed in each step.
 
-
-def lugre(speed: Array, distance: float, stribeck: float) -> Array:
-    """Bristles of LuGre without damping: dz/dt = v (1 − s z/g(v))/δ, g the Stribeck curve."""
-    curve = 1 + (STRIBECK - 1) * np.exp(-((speed / stribeck) ** 2))
+    Dahl's friction with g = 1, LuGre's without damping with a Stribeck curve.
+    """
     decay = np.exp(-np.abs(speed) / (FINE * distance * curve)).tolist()
     value, out = 0.0, []
     for s, g, d in zip(np.sign(speed).tolist(), curve.tolist(), decay, strict=True):

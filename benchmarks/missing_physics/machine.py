@@ -101,12 +101,6 @@ class Motion:
     """°C."""
     programme: int
 
-    def at(self, rows: NDArray[np.intp]) -> Motion:
-        """These rows."""
-        arrays = (self.time, self.angle, self.speed, self.acceleration)
-        picked = [x[rows] for x in arrays]
-        return Motion(*picked, self.mass, self.temperature[rows], self.programme)
-
 
 def draw_machine(random: Random, kind: str) -> tuple[Machine, tuple[float, ...]]:
     """A machine and the masses that are hung on it, kg (an axis: one, zero)."""

@@ -115,9 +115,9 @@ class Judged:
     seconds: float
 
 
-def score(truths: Path, answers: Path) -> list[Judged]:
-    """Every truth against the answer of its name; raises AnswerError."""
-    found = sorted(truths.glob("*.json"))
+def score(truths: Path, answers: Path, cases: int | None = None) -> list[Judged]:
+    """The first truths, or all, against the answers of their names; raises AnswerError."""
+    found = sorted(truths.glob("*.json"))[:cases]
     if not found:
         raise AnswerError(f"{truths}: no truths (*.json) there; write cases first")
     out = []

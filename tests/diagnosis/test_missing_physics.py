@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from entrants.case import Case as EntrantCase
 from missing_physics import effects, frictions, score
-from missing_physics.cases import KINDS, draw_case, kinds
+from missing_physics.cases import KINDS, draw_case, kinds, write_case
 from missing_physics.effects import ALL, CATALOGUE, Hidden, outputs, possible
 from missing_physics.enter import main
 from missing_physics.machine import EVERY, FINE, GRAVITY, Machine, draw_machine, motion
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.effects.bind import terms_of
+from winchkit.effects.catalogue import load_catalogue
 
 NOISE = {"cable_length": 1e-4, "tension": 1.0, "motor_torque": 0.01}
 WINCH = Machine("winch", 10.0, 0.0, NOISE, "grooved", 0.05, 0.004, 6.0, 5.0, 0.5, (np.pi,))
@@ -211,3 +215,18 @@ def test_the_readmes_commands_write_and_score(
 def test_every_name_is_in_the_readme() -> None:
     text = Path(effects.__file__).with_name("README.md").read_text(encoding="utf-8")
     assert [name for name in CATALOGUE if f"`{name}`" not in text] == []
+
+
+def test_winchkit_predicts_the_declared_machine_as_the_cases_do(tmp_path: Path) -> None:
+    drawn = (draw_case(5, index, "outside") for index in range(20))
+    blank = next(c for c in drawn if not c.hidden and c.machine.kind == "winch")
+    write_case(blank, tmp_path / "case")
+    case = EntrantCase(tmp_path / "case")
+    model = Hypothesis()
+    for term in terms_of(case.profile, load_catalogue()):
+        model = model.with_term(term, 1)
+    predicted = case.predicted(case.change(model))
+    for name, rms in blank.machine.noise.items():
+        error = np.array(predicted[name]) - blank.held_out[f"nominal_{name}"]
+        # Accelerations are differences of samples at 50 Hz there, of 200 Hz here.
+        assert np.sqrt(np.mean(error**2)) < 0.3 * rms
