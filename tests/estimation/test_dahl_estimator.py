@@ -148,7 +148,7 @@ def test_the_std_holds_what_parameters_drawn_at_random_do() -> None:
     assert np.median(std[later] / spread[later]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_parameters_whose_std_nobody_declares_leave_the_std_unknown() -> None:
+def test_parameters_without_a_declared_std_leave_the_std_unknown() -> None:
     estimator = DahlEstimator([replace(GROUP, covariance=PulleyGroup(WRAPS, 0.02, 1.0).covariance)])
     value, std = estimator.update(300.0, 0.0)
     assert value == 300.0

@@ -276,8 +276,8 @@ class HeldPlatform(PlatformPose):
                 measured = self.corrections.readings(self._bench.clock.now())
                 found = {"force": loop.force, "measured": measured, "missing": loop.error}
                 for name, values in found.items():
-                    told = map(finite_or_none, values.tolist())
-                    out[name] = dict(zip(self.robot.names, told, strict=True))
+                    shown = map(finite_or_none, values.tolist())
+                    out[name] = dict(zip(self.robot.names, shown, strict=True))
         return out
 
     def _hold_for(self, duration: float, hold: float) -> None:
@@ -302,16 +302,16 @@ class HeldPlatform(PlatformPose):
         found = preloaded(self.robot.structure(pose)[0], self.robot.weight(pose)[0], limits, wanted)
         if not np.isfinite(found.value).all():
             raise NotPermitted(_NO_FORCES)
-        told = ", ".join(f"{n} {x:.0f} N" for n, x in zip(names, found.value, strict=True))
+        shown = ", ".join(f"{n} {x:.0f} N" for n, x in zip(names, found.value, strict=True))
         if isinstance(preload, Mapping) and np.nanmax(np.abs(found.value - wanted)) > _MET:
             free = len(names) - self.robot.geometry.degrees
             raise NotPermitted(
                 f"cables {', '.join(named)} cannot have these forces at once: the platform leaves "
-                f"{max(0, free)} free here, and the nearest that balance its weight are {told}"
+                f"{max(0, free)} free here, and the nearest that balance its weight are {shown}"
             )
         if not found.feasible:
             raise NotPermitted(
-                f"this preload needs the forces {told}, and `tension` of [robot] is "
+                f"this preload needs the forces {shown}, and `tension` of [robot] is "
                 f"{limits.low:g} N to {limits.high:g} N; choose another preload"
             )
         return found.value

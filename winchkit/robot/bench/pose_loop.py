@@ -34,7 +34,7 @@ _DISAGREEMENT = np.array([5e-3, math.radians(1.0)])
 """A payload moves a platform on elastic cables by less (rule of thumb)."""
 
 _SHOWN = 50
-"""Poses of whose mean deviation a user is told: half a second at 100 Hz."""
+"""Poses whose mean deviation is reported: half a second at 100 Hz."""
 
 
 @dataclass(frozen=True)
