@@ -15,7 +15,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.open import open_bench
 from winchkit.catalog import find
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.robot import Robot, robot_of
 from winchkit.robot.bench.correction import Bounds, Correction
 from winchkit.robot.bench.force_loop import ForceLoop, ForceSetting
@@ -241,6 +241,19 @@ def test_without_a_cell_at_each_winch_it_is_refused(bench: Bench) -> None:
         bench.robot.trim()
     with pytest.raises(UsageError, match="is not a"):
         bench.robot.trim(travel=-0.01)
+    with pytest.raises(NotPermitted, match="winch 1 has no load cell"):
+        bench.robot.hold(preload=150.0)
+    with pytest.raises(NotPermitted, match="declares no tracker"):
+        bench.robot.hold(pose=bench.robot.pose)
+    with pytest.raises(NotPermitted, match=r"cables 1, 2, 3 cannot .* leaves 2 free"):
+        bench.robot.hold(preload={"1": 150.0, "2": 150.0, "3": 20.0})
+    with pytest.raises(UsageError, match="give a preload, a pose"):
+        bench.robot.hold()
+    with pytest.raises(UsageError, match="'Z' is no cable"):
+        bench.robot.hold(preload={"Z": 150.0})
+    with pytest.raises(MotionError, match="no preload is held"):
+        bench.robot.set_preload(150.0)
+    assert not bench.robot.moving
 
 
 @pytest.mark.slow

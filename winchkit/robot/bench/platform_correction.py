@@ -194,12 +194,12 @@ class HeldPlatform(PlatformPose):
         if preload is not None:
             here = self.pose
             force = self._preloaded(here, preload)
-            self.corrections.require_balance(here, force)
             loops.append(
                 self.corrections.force_loop(
                     here, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
                 )
             )
+            self.corrections.require_balance(here, force)
         if pose is not None:
             require_type(pose, Pose, "pose")
             loops.append(self.corrections.pose_loop(pose, self._bench.tracker, travel))
@@ -248,7 +248,9 @@ class HeldPlatform(PlatformPose):
         loop = next((one for one in self._held if isinstance(one, ForceLoop)), None)
         if loop is None or not self.moving:
             raise MotionError("no preload is held that could be changed; begin with hold")
-        loop.aim(self._preloaded(self.pose, preload))
+        force = self._preloaded(self.pose, preload)
+        self.corrections.require_torque(force, self._angles()[0])
+        loop.aim(force)
 
     def held(self) -> dict[str, Any]:
         """What is held, or was held last, and how far the platform is from it.
