@@ -276,7 +276,7 @@ class HeldPlatform(PlatformPose):
                 out["rotation_error"] = finite_or_none(float(np.linalg.norm(error[3:])))
             else:
                 measured = self.corrections.readings(self._bench.clock.now())
-                found = {"force": loop.force, "measured": measured, "missing": loop.error}
+                found = {"force": loop.force, "measured": measured, "missing": loop.mean_error}
                 for name, values in found.items():
                     shown = map(finite_or_none, values.tolist())
                     out[name] = dict(zip(self.robot.names, shown, strict=True))
