@@ -77,8 +77,11 @@ class Corrections:
         *,
         axial_stiffness: float | None = None,
         path: PathForces | None = None,
+        watched: bool = True,
     ) -> ForceLoop:
         """The control of the forces (n,) at a pose, at motor angles (n,), or along a ``path``.
+
+        ``watched``: whether readings that contradict the weight trip the bench.
 
         Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
         """
@@ -108,6 +111,7 @@ class Corrections:
             speed,
             min(winch.wiring.limits.acceleration for winch in self.winches),
             np.array([_unknown(line.profile) for line in self.robot.lines]),
+            watched,
         )
         return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
 

@@ -71,6 +71,8 @@ class ForceSetting:
     """m/s^2."""
     unknown: Array
     """Standard deviation of the readings by the friction of the pulleys, as a share, (n,)."""
+    watched: bool = True
+    """Whether readings that contradict the weight trip the bench."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,8 @@ class ForceLoop:
             self._begin(time, force, shown)
         missing = force - shown
         balanced = projection @ missing
-        self._watch(now, missing - balanced, force)
+        if setting.watched:
+            self._watch(now, missing - balanced, force)
         self.error = self._beyond(
             balanced - self._change * (1.0 - self._share(time - setting.lag)[0]), projection, shown
         )

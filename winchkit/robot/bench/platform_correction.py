@@ -331,7 +331,7 @@ class HeldPlatform(PlatformPose):
     ) -> list[CableCorrection]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
         loop = self.corrections.force_loop(
-            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
+            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness, watched=False
         )
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration
