@@ -9,7 +9,7 @@ friction of its pulleys follows Maxwell-slip elements with a Stribeck curve; the
 Dahl law that fits it best, its friction times ``--friction``, with a declared standard deviation of
 20 %.
 
-``step``: after a move and 4 s of rest the preload of cable 1 is held, then raised by 100 N. True
+``step``: after a move and 10 s of rest the preload of cable 1 is held, then raised by 100 N. True
 share of the step after 0.3 s and later, overshoot, and distance from the pose before the step.
 ``pose``: exit and anchor points 2 mm off (one standard deviation per coordinate), the pose held by
 the tracker; true distance from the goal over 2 s after 6 s; time until all winches stop without the
@@ -129,7 +129,7 @@ def away(bench: Bench, random: np.random.Generator) -> Pose:
     x, y, z = (random.uniform(-0.1, 0.1, 3) * [1, 1, 0.5]).tolist()
     goal = bench.robot.moved({"x": x, "y": y, "z": z}, relative=True)
     bench.robot.move(goal, 0.1)
-    bench.clock.sleep(4.0)
+    bench.clock.sleep(10.0)
     return goal
 
 
@@ -148,8 +148,7 @@ def step(seed: int, friction: float) -> dict[str, Any]:
         platform.hold(preload={"1": first[0], "2": first[1]}, hold=1.0)
         refreshed(bench, 3.0)
         bench.on_cycle(record)
-        bench.clock.sleep(0.25)
-        platform.refresh(1.0)
+        refreshed(bench, 1.0)
         begun, before = bench.clock.now(), platform._held[0]
         assert isinstance(before, force_loop.ForceLoop)
         set_before = before.force

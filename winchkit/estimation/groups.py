@@ -34,7 +34,7 @@ class PulleyGroup:
     shape: float = 1.0
     """β."""
     covariance: tuple[tuple[float, float, float], ...] = ((nan,) * 3,) * 3
-    """Of μ, σ and β; NaN where nobody declares it, zero for what is taken as exact."""
+    """Of μ, σ and β; NaN where it is not declared, zero for what is taken as exact."""
 
     @property
     def std(self) -> tuple[float, float, float]:
@@ -82,10 +82,12 @@ def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
     values, faults = values_of(effect, table)
     if faults:
         raise FileError(faults)
-    told = table.values.get("fitted", {}).get("std", {})
+    declared = table.values.get("fitted", {}).get("std", {})
     names = ("friction", "stiffness")
     std = [
-        parse(told[n], dimension_of(effect.parameter(n).unit) or "ratio") if n in told else nan
+        parse(declared[n], dimension_of(effect.parameter(n).unit) or "ratio")
+        if n in declared
+        else nan
         for n in names
     ]
     wraps = tuple(pulley.wrap for pulley in profile.pulley)

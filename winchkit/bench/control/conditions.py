@@ -525,7 +525,8 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition(
         "cable forces",
-        "measured cable forces of a platform against its weight, while they are corrected",
+        "measured cable forces of a platform against its weight, while they are held, or along a "
+        "motion with `tension_trim`",
         "a fifth of the mean set-point, for 0.1 s",
     ),
     BenchCondition(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 import click
@@ -23,6 +24,8 @@ from winchkit.errors import MotionError
 _NEEDS_CELL = "needs a bench with a load cell"
 _REHEARSED = 1.0
 """Time of a dry run, s."""
+_READINGS = 10
+"""The newest, of 0.5 s, whose mean is compared with the set tension: one has the cell's noise."""
 
 
 @click.command(
@@ -112,14 +115,21 @@ def command(
         if take_over:
             station.take_over(winch)
         station.hold_tension(winch, wanted, DEAD_MAN, bounds)
-        hold_on(station, winch, _REHEARSED if dry_run else math.inf if limit is None else limit)
-        reached = station.status()["winch"][winch]["load_tension"]
+        shown: deque[float | None] = deque(maxlen=_READINGS)
+        hold_on(
+            station,
+            winch,
+            _REHEARSED if dry_run else math.inf if limit is None else limit,
+            lambda: shown.append(station.status()["winch"][winch]["load_tension"]),
+        )
         station.release(winch)
         while station.moving(winch):
             station.clock.sleep(REFRESH)
         status = station.status()
     if dry_run:
         return
+    readings = [one for one in shown if one is not None]
+    reached = sum(readings) / len(readings) if readings else None
     tell({**status, "set_tension": wanted, "reached": reached}, [status_line(status)])
     if reached is None or abs(wanted - reached) > HELD * wanted:
         shown = "without a valid reading" if reached is None else f"{reached:.1f} N"

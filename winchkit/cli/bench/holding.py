@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from winchkit.bench.remote.operations import Station
 
 
-def hold_on(station: Station, winch: str | None, duration: float) -> None:
-    """Refresh what was just started for ``duration`` s; raises MotionError where it has ended."""
+def hold_on(
+    station: Station,
+    winch: str | None,
+    duration: float,
+    look: Callable[[], object] = lambda: None,
+) -> None:
+    """Refresh what was just started for ``duration`` s; raises MotionError where it has ended.
+
+    ``look`` is called after each refresh.
+    """
     from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
 
     clock = station.clock
@@ -17,3 +26,4 @@ def hold_on(station: Station, winch: str | None, duration: float) -> None:
     while (left := end - clock.now()) > 0:
         clock.sleep(min(REFRESH, left))
         station.refresh(winch, hold=DEAD_MAN)
+        look()

@@ -217,7 +217,11 @@ def _tap(bus: str, start: float, frames: list[Frame]) -> Callable[[Carried], Non
 
 
 def _simulated(
-    spec: BenchSpec, mass: float | None, body: PlatformTruth | None, *, cells: bool
+    spec: BenchSpec,
+    mass: float | None,
+    body: PlatformTruth | None = None,
+    *,
+    cells: bool = False,
 ) -> SimBench:
     """The bench as it is wired, without instruments or with ``cells``, its declarations being true.
 

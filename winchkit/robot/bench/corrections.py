@@ -32,6 +32,8 @@ TRAVEL = 0.01
 pose."""
 _ALONG_SPEED, _ALONG_END = 0.02, 1.0
 """Of each cable in a correction during a motion, m/s, and its time after the end, s."""
+_LISTENS = 3
+"""Longest ages of a pose for which a tracker that shows nothing is waited for."""
 _PROBE = 1.0
 """Force by which the elasticity of a cable is tried in the profile, N."""
 
@@ -75,8 +77,11 @@ class Corrections:
         *,
         axial_stiffness: float | None = None,
         path: PathForces | None = None,
+        watched: bool = True,
     ) -> ForceLoop:
         """The control of the forces (n,) at a pose, at motor angles (n,), or along a ``path``.
+
+        ``watched``: whether readings that contradict the weight trip the bench.
 
         Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
         """
@@ -92,7 +97,7 @@ class Corrections:
             newest = cell.latest
             filtered = 0.0 if newest is None else newest.t_receive - newest.t_sample
             delays.append(filtered + cell.period)
-        self._require_torque(force, angles)
+        self.require_torque(force, angles)
         late = max(winch.wiring.limits.response_time for winch in self.winches)
         stiffness, known = self._stiffness(pose, force, angles, axial_stiffness)
         setting = ForceSetting(
@@ -106,6 +111,7 @@ class Corrections:
             speed,
             min(winch.wiring.limits.acceleration for winch in self.winches),
             np.array([_unknown(line.profile) for line in self.robot.lines]),
+            watched,
         )
         return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
 
@@ -173,8 +179,10 @@ class Corrections:
             self.bench.loop.supervisor.latch,
             numbers=robot.tracker,
         )
-        now = self.bench.clock.now()
-        newest = tracker.require(now - wiring.tracker.max_age, wiring.tracker.listen)[-1]
+        age, clock = wiring.tracker.max_age, self.bench.clock
+        if not tracker.since(clock.now() - age):
+            clock.sleep(_LISTENS * age)  # it may listen from now on only
+        newest = tracker.require(clock.now() - age, wiring.tracker.listen)[-1]
         loop.error = loop.deviation(newest)
         way = -robot.structure(goal)[0].T @ loop.error
         worst = int(np.argmax(np.abs(way)))
@@ -223,7 +231,7 @@ class Corrections:
         there, more = (self.robot.lengths_at(angles, one) for one in (force, force + _PROBE))
         return np.asarray((more - there)[0] / _PROBE)
 
-    def _require_torque(self, force: Array, angles: Array) -> None:
+    def require_torque(self, force: Array, angles: Array) -> None:
         """Raise NotPermitted where a drive's torque does not hold a cable force (n,)."""
         for winch, pull, angle in zip(self.winches, force.tolist(), angles.tolist(), strict=True):
             drive = self.bench.axes[winch.name].drive

@@ -19,6 +19,7 @@ other by, whatever the preload is: a cell that jumps or stands still shows there
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,8 @@ _UNBALANCED_TIME = 0.1
 _EXPLAINED = 2.0
 """Standard deviations of the readings, by the friction that is not known, within which a deviation
 is not corrected."""
+_SHOWN = 50
+"""Cycles whose mean deviation is reported: one has the noise of the cells."""
 _FEED = 0.8
 """Share of speed and acceleration for the change of the set-point; the loop has the rest."""
 _RISE = 0.05
@@ -68,6 +71,8 @@ class ForceSetting:
     """m/s^2."""
     unknown: Array
     """Standard deviation of the readings by the friction of the pulleys, as a share, (n,)."""
+    watched: bool = True
+    """Whether readings that contradict the weight trip the bench."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +130,13 @@ class ForceLoop:
         self._begun = 0.0
         self.error = self._change
         """Missing forces that balance each other, beyond what friction explains, (n,), N."""
+        self._errors: deque[Array] = deque(maxlen=_SHOWN)
         self._unbalanced_since = float("inf")
+
+    @property
+    def mean_error(self) -> Array:
+        """Mean of the newest 50 of :attr:`error`, (n,); zero before the first."""
+        return np.asarray(np.mean(list(self._errors) or [self.error], axis=0))
 
     def aim(self, force: Array) -> None:
         """Take another set-point, (n,), N, from the next cycle on; from any thread."""
@@ -147,10 +158,12 @@ class ForceLoop:
             self._begin(time, force, shown)
         missing = force - shown
         balanced = projection @ missing
-        self._watch(now, missing - balanced, force)
+        if setting.watched:
+            self._watch(now, missing - balanced, force)
         self.error = self._beyond(
             balanced - self._change * (1.0 - self._share(time - setting.lag)[0]), projection, shown
         )
+        self._errors.append(self.error)
         feed = self._change * self._share(time)[1]
         if self._path is not None and self._path.feeds and setting.known:
             feed = self._path.rate

@@ -194,12 +194,12 @@ class HeldPlatform(PlatformPose):
         if preload is not None:
             here = self.pose
             force = self._preloaded(here, preload)
-            self.corrections.require_balance(here, force)
             loops.append(
                 self.corrections.force_loop(
                     here, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
                 )
             )
+            self.corrections.require_balance(here, force)
         if pose is not None:
             require_type(pose, Pose, "pose")
             loops.append(self.corrections.pose_loop(pose, self._bench.tracker, travel))
@@ -248,7 +248,9 @@ class HeldPlatform(PlatformPose):
         loop = next((one for one in self._held if isinstance(one, ForceLoop)), None)
         if loop is None or not self.moving:
             raise MotionError("no preload is held that could be changed; begin with hold")
-        loop.aim(self._preloaded(self.pose, preload))
+        force = self._preloaded(self.pose, preload)
+        self.corrections.require_torque(force, self._angles()[0])
+        loop.aim(force)
 
     def held(self) -> dict[str, Any]:
         """What is held, or was held last, and how far the platform is from it.
@@ -274,10 +276,10 @@ class HeldPlatform(PlatformPose):
                 out["rotation_error"] = finite_or_none(float(np.linalg.norm(error[3:])))
             else:
                 measured = self.corrections.readings(self._bench.clock.now())
-                found = {"force": loop.force, "measured": measured, "missing": loop.error}
+                found = {"force": loop.force, "measured": measured, "missing": loop.mean_error}
                 for name, values in found.items():
-                    told = map(finite_or_none, values.tolist())
-                    out[name] = dict(zip(self.robot.names, told, strict=True))
+                    shown = map(finite_or_none, values.tolist())
+                    out[name] = dict(zip(self.robot.names, shown, strict=True))
         return out
 
     def _hold_for(self, duration: float, hold: float) -> None:
@@ -302,16 +304,16 @@ class HeldPlatform(PlatformPose):
         found = preloaded(self.robot.structure(pose)[0], self.robot.weight(pose)[0], limits, wanted)
         if not np.isfinite(found.value).all():
             raise NotPermitted(_NO_FORCES)
-        told = ", ".join(f"{n} {x:.0f} N" for n, x in zip(names, found.value, strict=True))
+        shown = ", ".join(f"{n} {x:.0f} N" for n, x in zip(names, found.value, strict=True))
         if isinstance(preload, Mapping) and np.nanmax(np.abs(found.value - wanted)) > _MET:
             free = len(names) - self.robot.geometry.degrees
             raise NotPermitted(
                 f"cables {', '.join(named)} cannot have these forces at once: the platform leaves "
-                f"{max(0, free)} free here, and the nearest that balance its weight are {told}"
+                f"{max(0, free)} free here, and the nearest that balance its weight are {shown}"
             )
         if not found.feasible:
             raise NotPermitted(
-                f"this preload needs the forces {told}, and `tension` of [robot] is "
+                f"this preload needs the forces {shown}, and `tension` of [robot] is "
                 f"{limits.low:g} N to {limits.high:g} N; choose another preload"
             )
         return found.value
@@ -329,7 +331,7 @@ class HeldPlatform(PlatformPose):
     ) -> list[CableCorrection]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
         loop = self.corrections.force_loop(
-            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
+            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness, watched=False
         )
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration
