@@ -132,9 +132,9 @@ def command(
     reached = sum(readings) / len(readings) if readings else None
     tell({**status, "set_tension": wanted, "reached": reached}, [status_line(status)])
     if reached is None or abs(wanted - reached) > HELD * wanted:
-        shown = "without a valid reading" if reached is None else f"{reached:.1f} N"
+        held = "without a valid reading" if reached is None else f"{reached:.1f} N"
         raise MotionError(
-            f"winch {winch}: {shown} at the end of the {limit or 0.0:g} s, set are {wanted:.1f} N "
+            f"winch {winch}: {held} at the end of the {limit or 0.0:g} s, set are {wanted:.1f} N "
             f"(limit of the difference {HELD:.0%}, {HELD * wanted:.1f} N); hold it longer, or give "
             "--stiffness: by the bound of the profile a soft cable is slow"
         )

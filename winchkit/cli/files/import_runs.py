@@ -75,7 +75,7 @@ def write_runs(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
-    entries = []
+    entries: list[dict[str, Any]] = []
     for (_, run), target in zip(results, targets, strict=True):
         write_run(run, target)
         summary = summary_of(run)
