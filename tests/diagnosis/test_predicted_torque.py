@@ -9,10 +9,19 @@ import pytest
 
 from model_files import invoke
 from winchkit import compare, diagnose, read_profile, read_run
+from winchkit.arrays import Array
 
 JOINT = 'schema = 1\nkind = "axis"\nname = "joint"\n'
 HEADER = "time [s],motor_angle [rad],motor_torque [N m],predicted_torque [N m]"
 NOISE = 0.05
+
+
+def _rigid_body(time: Array) -> tuple[Array, Array, Array]:
+    """Angle, rate and torque of the body's own motion, rad, rad/s and N m."""
+    angle = 1.2 * np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time)
+    rate = 1.08 * np.cos(0.9 * time) + 0.92 * np.cos(2.3 * time)
+    acceleration = -0.972 * np.sin(0.9 * time) - 2.116 * np.sin(2.3 * time)
+    return angle, rate, 1.9 * acceleration + 22 * np.sin(angle + 0.3) + 3 * np.sin(2 * angle)
 
 
 def arm(
@@ -20,13 +29,10 @@ def arm(
 ) -> tuple[Path, Path]:
     """A joint of a rigid body with load-dependent friction, and its author's frictionless model."""
     rng, time = np.random.default_rng(4), np.arange(0, 40, 0.01)
-    angle = 1.2 * np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time)
-    rate = 1.08 * np.cos(0.9 * time) + 0.92 * np.cos(2.3 * time)
-    acceleration = -0.972 * np.sin(0.9 * time) - 2.116 * np.sin(2.3 * time)
-    model = 1.9 * acceleration + 22 * np.sin(angle + 0.3) + 3 * np.sin(2 * angle)
-    torque = model + (1.2 + 0.12 * np.abs(model)) * np.tanh(rate / 2e-3)
+    angle, rate, own = _rigid_body(time)
+    torque = own + (1.2 + 0.12 * np.abs(own)) * np.tanh(rate / 2e-3)
     torque += NOISE * rng.standard_normal(len(time))
-    model = np.interp(time - late, time, model)
+    model = _rigid_body(time - late)[2]
     if gap:
         model = np.where((time > 10) & (time < 11), np.nan, model)
     run, profile = folder / "arm.csv", folder / "joint.toml"
@@ -55,7 +61,9 @@ def test_a_model_that_is_shifted_is_told_beside_its_friction(tmp_path: Path, lat
     found = diagnose([read_run(run)], read_profile(profile)).diagnosis
     values = {step.effects[0]: step.parameters[step.effects[0]] for step in found.steps}
     assert values["prediction-delay"]["delay"].value == pytest.approx(late, abs=5e-3)
-    assert set(values) <= {"prediction-delay", "friction-of-load", "motor-coulomb"}
+    # Beyond the end of the run the prediction is unknown: 0.1 s of it is held, which is an offset.
+    others = set(values) - {"prediction-delay", "friction-of-load", "motor-coulomb"}
+    assert all(step.share < 0.01 for step in found.steps if step.effects[0] in others)
     assert found.outputs["motor_torque"].heldout_rms_after < 3 * NOISE
 
 

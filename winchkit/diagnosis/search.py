@@ -15,6 +15,7 @@ import numpy as np
 
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
@@ -141,9 +142,9 @@ def _with_delays_last(
 ) -> tuple[TimeSeriesSelection, SelectionResult]:
     """The result, or that in which delays were the last candidates.
 
-    A delay found first may take a part of cogging and friction, whose sizes are then wrong. Where
-    no more effects without any delay leave at most a tenth more of what the given result explains,
-    they are the model, and delays are added to it where they are accepted.
+    A delay that the others imitate may take a part of cogging and friction, whose sizes are then
+    wrong. Where no more effects without any delay leave at most a tenth more of what the given
+    result explains, they are the model, and delays are added to it where they are accepted.
     """
 
     def added(fitted: Fit) -> list[Effect]:
@@ -152,7 +153,12 @@ def _with_delays_last(
     def has_more(fitted: Fit) -> bool:
         return len(added(fitted)) > len(added(result.final))
 
-    if not any(effect.is_delay for effect in added(result.final)):
+    if not any(
+        term.effect.is_delay
+        and collinearity(engine.regression, result.final, result.noise, index) > COLLINEAR_DELAY
+        for index, term in enumerate(result.final.hypothesis.terms)
+        if index >= engine.n_initial_terms
+    ):
         return engine, result
     other = selection_engine(engine.regression.dataset, catalogue)
     other.on_trial, other.delays_wait = engine.on_trial, True
