@@ -56,7 +56,7 @@ def test_friction_that_a_model_lacks_is_named_with_its_values(tmp_path: Path, ga
 
 
 @pytest.mark.parametrize("late", [0.1, -0.1])
-def test_a_shifted_model_is_named_beside_its_friction(tmp_path: Path, late: float) -> None:
+def test_a_shift_of_the_model_is_named_beside_its_friction(tmp_path: Path, late: float) -> None:
     run, profile = arm(tmp_path, late=late)
     found = diagnose([read_run(run)], read_profile(profile)).diagnosis
     values = {step.effects[0]: step.parameters[step.effects[0]] for step in found.steps}
