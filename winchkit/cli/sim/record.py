@@ -31,7 +31,8 @@ _RATE = 50.0
         "winchkit sim record demo-elastic-rope programme-demo -o runs",
         "winchkit sim record spiral-bench short.toml --seed 3 --hidden 'elastic rope'",
         Example(
-            "winchkit sim record cabtive-robot robot-star.toml -o runs", "needs a robot programme"
+            "winchkit sim record cabtive-robot robot-star.toml -o runs",
+            "needs a bench with a robot",
         ),
     ),
 )

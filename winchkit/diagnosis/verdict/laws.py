@@ -60,6 +60,19 @@ def _with_simpler_laws(
     return present
 
 
+def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: Noise) -> set[str]:
+    """Ids of the additions whose shape is at a bound, implausible, or not determined."""
+    out = set()
+    for index in range(engine.n_initial_terms, len(fitted.hypothesis.terms)):
+        term = fitted.hypothesis.terms[index]
+        if term.effect.reduces_to:
+            spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
+            values = estimates(engine.regression, fitted, spread)[index][1]
+            if reduced_law(term, values, engine.profile):
+                out.add(term.effect.id)
+    return out
+
+
 def _lost_share(
     engine: SelectionEngine, simpler: Fit, present: Fit, noise: Noise, index: int
 ) -> float:
