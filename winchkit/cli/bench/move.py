@@ -37,7 +37,6 @@ _POLL = 0.05
         "winchkit move A --to '3.9 m' --speed '0.2 m/s'",
         "winchkit move all --pay-out 50mm -b bench.toml",
         Example("winchkit move --pose x=0.1m,yaw=2deg -b robot.toml", "needs a bench with a robot"),
-        Example("winchkit move --pose-by z=20mm -b robot.toml", "needs a bench with a robot"),
     ),
 )
 @winch_argument

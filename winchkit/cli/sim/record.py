@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -30,10 +30,6 @@ _RATE = 50.0
     examples=(
         "winchkit sim record demo-elastic-rope programme-demo -o runs",
         "winchkit sim record spiral-bench short.toml --seed 3 --hidden 'elastic rope'",
-        Example(
-            "winchkit sim record cabtive-robot robot-star.toml -o runs",
-            "needs a bench with a robot",
-        ),
     ),
 )
 @click.argument("bench", type=SIM_BENCH)

@@ -31,16 +31,12 @@ _REHEARSED = 1.0
     cls=Command,
     examples=(
         Example("winchkit hold-platform --preload 600N --for 5s -b robot.toml", _NEEDS_ROBOT),
-        Example(
-            "winchkit hold-platform --preload 1=600N,2=500N --pose x=0.1m -b robot.toml",
-            _NEEDS_ROBOT,
-        ),
     ),
 )
 @bench_option
 @click.option(
     "--preload",
-    metavar="FORCE",
+    metavar="FORCES",
     help="Forces nearest to it in all cables (600N), or those of cables by name (1=600N,2=500N).",
 )
 @click.option("--pose", metavar="POSE", help="Pose to hold by the tracker, x=0.1m,yaw=2deg.")
@@ -128,12 +124,13 @@ def command(
 
 def _preload(text: str) -> float | dict[str, float]:
     """A force, or forces by cable; raises UsageError."""
-    from winchkit.cli.core.quantities import quantity
+    from winchkit.cli.core.quantities import check_typed, quantity
 
-    if "=" not in text:
-        return quantity(text, "force")
-    pairs = (part.partition("=") for part in text.split(","))
-    return {name.strip(): quantity(value.strip(), "force") for name, _, value in pairs}
+    pairs = [part.partition("=") for part in text.split(",")] if "=" in text else [("", "", text)]
+    for _, _, value in pairs:
+        check_typed("--preload", value.strip(), "force", example="600 N")
+    forces = {name.strip(): quantity(value.strip(), "force") for name, _, value in pairs}
+    return forces if "=" in text else forces[""]
 
 
 def _lines(held: Mapping[str, Any]) -> Iterator[str]:
