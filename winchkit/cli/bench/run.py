@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.early_checks import check_folder, check_winches
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
@@ -37,7 +37,6 @@ _POLL = 0.05
     examples=(
         "winchkit run short.toml -b bench.toml -o runs",
         "winchkit run short.toml -b bench.toml --dry-run",
-        Example("winchkit run rectangle.toml -b robot.toml -o runs", "needs a bench with a robot"),
     ),
 )
 @click.argument("programme", type=PROGRAMME)

@@ -31,6 +31,7 @@ _REHEARSED = 1.0
     cls=Command,
     examples=(
         Example("winchkit hold-platform --preload 600N --for 5s -b robot.toml", _NEEDS_ROBOT),
+        Example("winchkit hold-platform --pose x=0.1m -b robot.toml", _NEEDS_ROBOT),
     ),
 )
 @bench_option
