@@ -110,7 +110,7 @@ NAMES = names()
         (0x77F, "05", "host.heartbeat", "host: operational"),
         (0x603, "4041600000000000", "A.sdo", "A: read 6041h Statusword"),
         (0x603, "6000000000000000", "A.sdo", "A: next segment"),
-        (0x123, "00", "", "node 35: 00"),
+        (0x123, "00", "", "00"),
     ],
 )
 def test_frames_are_named_and_read(identifier: int, data: str, name: str, words: str) -> None:
