@@ -52,7 +52,8 @@ def implausible_value(
         return None
     shown = f"{parameter.name} = {_text(estimate.value, parameter)}"
     known = plausible_range(parameter, profile)
-    if known is not None and _is_held(estimate.value, known[:2], parameter):
+    judged = parameter.role == "shape" or isfinite(estimate.std)
+    if known is not None and judged and _is_held(estimate.value, known[:2], parameter):
         return f"{shown} is at the end of the plausible range ({known[2]}): {_CHECK}"
     if not isfinite(estimate.std):
         return None
