@@ -16,7 +16,7 @@ import numpy as np
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
-from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.cross_validation import CERTAIN, held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
@@ -52,8 +52,6 @@ _SEARCH = (0.4, 0.8)
 of the processor time and ends at 79 to 86 %."""
 _NAMING = (0.8, 1.0)
 """The same for the equivalence sets; measured: the rest."""
-_OF_EXPLAINED = 0.1
-"""The tenth of the decision: what a law may leave of what it explains."""
 
 
 def no_progress(what: str, share: float) -> None:
@@ -118,7 +116,6 @@ def _with_transitions(
     it in every law of friction. It ends where ``is_enough``.
     """
     transitions: dict[str, float] = {}
-    delays_wait = engine.delays_wait
 
     def is_rounded(present: Fit, noise: Noise) -> bool:
         if is_enough(present):
@@ -132,7 +129,7 @@ def _with_transitions(
         return result, None
     rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue.of_winches())
     again = selection_engine(engine.regression.dataset, rounded)
-    again.on_trial, again.delays_wait = trials, delays_wait
+    again.on_trial, again.delays_wait = trials, engine.delays_wait
     again.on_step = lambda present, noise: is_enough(present)
     return stepwise_selection(again), (again, rounded)
 
@@ -147,11 +144,8 @@ def _with_delays_last(
     result explains, they are the model, and delays are added to it where they are accepted.
     """
 
-    def added(fitted: Fit) -> list[Effect]:
-        return [term.effect for term in fitted.hypothesis.terms[engine.n_initial_terms :]]
-
     def has_more(fitted: Fit) -> bool:
-        return len(added(fitted)) > len(added(result.final))
+        return _has_more(fitted, result.final)
 
     if not any(
         term.effect.is_delay
@@ -167,23 +161,30 @@ def _with_delays_last(
         return engine, result
     other, catalogue = rounded or (other, catalogue)
     found = _simplified(other, found)
-    if has_more(found.final) or not _explains_as_much(engine, result, found):
+    if not _takes_place(engine, result, found):
         return engine, result
     final, noise = with_delays(other, found.final, found.noise)
     return other, replace(found, final=final, noise=noise, scores=result.scores, tried=result.tried)
 
 
-def _explains_as_much(
+def _has_more(fitted: Fit, other: Fit) -> bool:
+    """Whether a model has more effects than another one."""
+    return len(fitted.hypothesis.terms) > len(other.hypothesis.terms)
+
+
+def _takes_place(
     engine: TimeSeriesSelection, result: SelectionResult, other: SelectionResult
 ) -> bool:
-    """Whether another result leaves at most a tenth more of what a result explains."""
+    """Whether another result has no more effects than a result and explains nine tenths as much."""
+    if _has_more(other.final, result.final):
+        return False
     regression = engine.regression
     before, now, then = (
         held_out_rms(regression, fitted, result.noise, regression.blocks)
         for fitted in (result.initial_model, result.final, other.final)
     )
     return all(
-        then[name] ** 2 - now[name] ** 2 <= _OF_EXPLAINED * (before[name] ** 2 - now[name] ** 2)
+        then[name] ** 2 - now[name] ** 2 <= CERTAIN * (before[name] ** 2 - now[name] ** 2)
         for name in now
     )
 
@@ -205,9 +206,7 @@ def _with_plain_laws(
     again = selection_engine(engine.regression.dataset, catalogue, others)
     again.on_trial = engine.on_trial
     found = _simplified(again, stepwise_selection(again))
-    more = len(found.final.hypothesis.terms) > len(plain.final.hypothesis.terms)
-    as_much = not more and _explains_as_much(engine, plain, found)
-    return (again, found) if as_much else (engine, plain)
+    return (again, found) if _takes_place(engine, plain, found) else (engine, plain)
 
 
 def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:

@@ -50,10 +50,8 @@ def _with_simpler_laws(
         if not term.effect.reduces_to:
             continue
         simpler = settled(with_simpler_law(engine, present, noise, index))
-        spread = spread_of(engine.regression, present, noise, engine.regression.blocks, index)
-        values = estimates(engine.regression, present, spread)[index][1]
         if _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO or (
-            reduced_law(term, values, engine.profile)
+            _is_degenerate(engine, present, noise, index)
             and _lost_share(engine, simpler, present, noise, index) <= CERTAIN
         ):
             present = simpler
@@ -62,15 +60,18 @@ def _with_simpler_laws(
 
 def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: Noise) -> set[str]:
     """Ids of the additions whose shape is at a bound, implausible, or not determined."""
-    out = set()
-    for index in range(engine.n_initial_terms, len(fitted.hypothesis.terms)):
-        term = fitted.hypothesis.terms[index]
-        if term.effect.reduces_to:
-            spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
-            values = estimates(engine.regression, fitted, spread)[index][1]
-            if reduced_law(term, values, engine.profile):
-                out.add(term.effect.id)
-    return out
+    terms = list(enumerate(fitted.hypothesis.terms))[engine.n_initial_terms :]
+    return {
+        term.effect.id
+        for index, term in terms
+        if term.effect.reduces_to and _is_degenerate(engine, fitted, noise, index)
+    }
+
+
+def _is_degenerate(engine: SelectionEngine, fitted: Fit, noise: Noise, index: int) -> bool:
+    spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
+    term, values = estimates(engine.regression, fitted, spread)[index]
+    return reduced_law(term, values, engine.profile)
 
 
 def _lost_share(
