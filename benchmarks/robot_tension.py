@@ -36,7 +36,6 @@ from winchkit import find, open_bench, read_simbench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
-from winchkit.bench.tracker import Tracker
 from winchkit.errors import MotionError
 from winchkit.robot.bench import force_loop
 from winchkit.robot.forces.force_distribution import quadratic
@@ -109,10 +108,8 @@ def opened(
                 axial_stiffness=200e3,
                 tension_trim=trim,
             )
-            tracker = Tracker(clock.now)
-            live.robot.on_pose = tracker.receive
             with open_bench(replace(live.bench_spec, robot=wiring), clock) as bench:
-                bench.take_tracker(tracker)
+                assert bench.tracker is not None, "it receives from now on"
                 clock.sleep(0.5)
                 yield live, bench
 

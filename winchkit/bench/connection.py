@@ -128,17 +128,6 @@ class BenchConnection(ABC):
                     self._tracker.listen(wiring.listen)
             return self._tracker
 
-    def take_tracker(self, tracker: Tracker) -> None:
-        """Take the poses of a receiver, such as of a simulation, instead of those at the address.
-
-        Parameters
-        ----------
-        tracker : Tracker
-            It is closed with the bench.
-        """
-        with self._tracker_lock:
-            self._tracker = tracker
-
     def __enter__(self) -> Self:
         return self
 

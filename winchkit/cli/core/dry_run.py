@@ -172,7 +172,6 @@ def _rehearsal(
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
     from winchkit.bench.robot import no_robot, robot_of_bench
-    from winchkit.bench.tracker import Tracker
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
     from winchkit.units import GRAVITY
@@ -195,10 +194,6 @@ def _rehearsal(
         for name, wire in live.wire.items():
             wire.taps.append(_tap(name, clock.now(), frames))
         with open_bench(live.bench_spec, clock) as bench:
-            if live.robot is not None:
-                tracker = Tracker(clock.now)
-                live.robot.on_pose = tracker.receive
-                bench.take_tracker(tracker)
             station = LocalStation(bench)
             clock.sleep(_READINGS if simulated.platform or tension else 0.0)
             yield station
