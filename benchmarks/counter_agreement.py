@@ -24,7 +24,7 @@ from scipy.signal import lfilter
 
 from winchkit.catalog import find, names
 from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
-from winchkit.drivers.can.cia402.units import Scale, Units, scale_of
+from winchkit.drivers.can.cia402.units import CountScale, UnitObjects, scale_of
 from winchkit.schema.read import read_device
 
 Array = npt.NDArray[np.float64]
@@ -49,27 +49,27 @@ class Motion:
     """rad/s."""
 
 
-def _first_order(lag: float) -> Callable[[Array, Scale], Array]:
+def _first_order(lag: float) -> Callable[[Array, CountScale], Array]:
     keep = math.exp(-CYCLE / lag)
     return lambda v, _: np.asarray(lfilter([1 - keep], [1, -keep], v))
 
 
-def _average(span: float) -> Callable[[Array, Scale], Array]:
+def _average(span: float) -> Callable[[Array, CountScale], Array]:
     count = round(span / CYCLE)
     return lambda v, _: np.asarray(lfilter(np.full(count, 1 / count), [1.0], v))
 
 
-def _late(span: float) -> Callable[[Array, Scale], Array]:
+def _late(span: float) -> Callable[[Array, CountScale], Array]:
     count = round(span / CYCLE)
     return lambda v, _: np.concatenate((np.full(count, v[0]), v[:-count]))
 
 
-def _slow(v: Array, _scale: Scale) -> Array:
+def _slow(v: Array, _scale: CountScale) -> Array:
     held = np.arange(len(v)) // 5 * 5
     return np.asarray(v[held])
 
 
-FILTERS: dict[str, Callable[[Array, Scale], Array]] = {
+FILTERS: dict[str, Callable[[Array, CountScale], Array]] = {
     "as it is": lambda v, _: v,
     "rounded down": lambda v, s: np.floor(v / s.velocity) * s.velocity,
     "whole rpm": lambda v, _: np.round(v / (_TURN / 60)) * _TURN / 60,
@@ -82,13 +82,13 @@ FILTERS: dict[str, Callable[[Array, Scale], Array]] = {
 }
 
 
-def drives() -> dict[str, Scale]:
+def drives() -> dict[str, CountScale]:
     """Units of every shipped drive, by its device file."""
     found = {}
     for name in names("devices"):
         device = read_device(find("devices", name))
         if device.servo is not None:
-            found[name] = scale_of(Units(), device.servo)
+            found[name] = scale_of(UnitObjects(), device.servo)
     return found
 
 
@@ -127,13 +127,13 @@ def motion(random: np.random.Generator, duration: float) -> Motion:
     )
 
 
-def agreement_of(scale: Scale) -> PositionAgreement:
+def agreement_of(scale: CountScale) -> PositionAgreement:
     """The comparison as a bench with the defaults makes it."""
     return PositionAgreement(scale.angle, scale.velocity, RESPONSE, _LATE, 1.5 * SPEED / RADIUS)
 
 
 def false_ones(
-    scale: Scale, shown: Callable[[Array, Scale], Array], seconds: float, seed: int
+    scale: CountScale, shown: Callable[[Array, CountScale], Array], seconds: float, seed: int
 ) -> int:
     """Disagreements of measurements that are right."""
     random, found = np.random.default_rng(seed), 0
@@ -150,7 +150,7 @@ def false_ones(
     return found
 
 
-def _seen(scale: Scale, speed: float, jump: float, *, stands: bool) -> bool:
+def _seen(scale: CountScale, speed: float, jump: float, *, stands: bool) -> bool:
     """Whether a jump (m of cable), or a counter that stands still, at a speed (m/s) is seen."""
     compare = agreement_of(scale)
     count = round((30.0 if stands else 6.0) / CYCLE)
@@ -175,12 +175,12 @@ def _least(seen: Callable[[float], bool], low: float, high: float) -> float:
     return high
 
 
-def smallest_jump(scale: Scale, speed: float) -> float:
+def smallest_jump(scale: CountScale, speed: float) -> float:
     """Of 6064h that is seen at a steady speed (m/s), m of cable."""
     return _least(lambda jump: _seen(scale, speed, jump, stands=False), 0.0, 0.1)
 
 
-def slowest(scale: Scale) -> float:
+def slowest(scale: CountScale) -> float:
     """Speed at which a counter that stands still is seen, m/s."""
     return _least(lambda speed: _seen(scale, speed, 0.0, stands=True), 0.0, SPEED)
 

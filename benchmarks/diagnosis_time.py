@@ -21,7 +21,7 @@ from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects import load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.record import simulate
@@ -48,11 +48,11 @@ def programme() -> Programme:
     """Strokes of several speeds with rests and a slow reversal, under every load, twice."""
     steps = []
     for mass in LOADS:
-        steps.append(Step(ask=f"hang the {mass:g} kg load", load_mass=mass))
+        steps.append(ProgrammeStep(ask=f"hang the {mass:g} kg load", load_mass=mass))
         for to, speed, rest in 3 * STROKES:
-            steps.append(Step(to=to, speed=speed, acceleration=0.8))
-            steps.append(Step(hold=rest))
-        steps.append(Step(hold=SECONDS))
+            steps.append(ProgrammeStep(to=to, speed=speed, acceleration=0.8))
+            steps.append(ProgrammeStep(hold=rest))
+        steps.append(ProgrammeStep(hold=SECONDS))
     return Programme("long", tuple(steps), repeat=2)
 
 

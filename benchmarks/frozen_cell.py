@@ -20,7 +20,7 @@ from math import exp, inf, log, nan, pi, sin
 from random import Random
 
 from winchkit.bench.control.frozen_cell import FrozenCell
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 MASS, GRAVITY, COUNT = 20.0, 9.81, 0.01
 """kg, m/s², N."""
@@ -86,7 +86,7 @@ class Watched(FrozenCell):
         self.sums: list[int] = [0] * 60
         self.runs = 0
 
-    def _begin(self, reading: Reading | None) -> None:
+    def _begin(self, reading: InstrumentReading | None) -> None:
         self.runs += 1
         self.sums[min(59, int(self._sum))] += 1
         super()._begin(reading)
@@ -98,7 +98,7 @@ class Watched(FrozenCell):
 
 def readings(
     cell: Cell, seconds: float, random: Random, *, frozen_at: float = inf, wrong: float = 0.0
-) -> Iterator[tuple[Reading, float, bool, float]]:
+) -> Iterator[tuple[InstrumentReading, float, bool, float]]:
     """Reading, predicted tension, whether the winch moves, acceleration, for each conversion.
 
     The true change of the tension is ``1 + wrong`` times the predicted one.
@@ -122,7 +122,7 @@ def readings(
         value = counts * COUNT
         when = (now, now + 0.002, now - 0.005, 0.005)
         yield (
-            Reading(value, value, counts, Quality.GOOD, *when),
+            InstrumentReading(value, value, counts, Quality.GOOD, *when),
             MASS * (GRAVITY + acceleration),
             moving,
             acceleration,
@@ -139,7 +139,7 @@ def false_trips(cell: Cell, hours: float, seed: int) -> dict[str, object]:
         wrong = random.uniform(-0.2, 0.2)
         start = part * 360.0 * hours
         for reading, predicted, moving, _ in readings(cell, 360.0 * hours, random, wrong=wrong):
-            moved = Reading(
+            moved = InstrumentReading(
                 reading.value, reading.gross, reading.raw, reading.quality,
                 reading.t_request + start, reading.t_receive + start,
                 reading.t_sample + start, reading.t_uncertainty,

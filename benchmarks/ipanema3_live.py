@@ -40,7 +40,7 @@ from winchkit.robot import (
     robot_of,
 )
 from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
-from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
+from winchkit.robot.sim.platform import CablePlatform, Pulleys, RigidBody
 from winchkit.schema.read import read_robot
 
 GOAL = np.array([-0.55, 0.55, 0.70])
@@ -69,7 +69,7 @@ def motion(robot: Robot, acceleration: float) -> tuple[np.ndarray, np.ndarray, n
 def simulated(robot: Robot, tension: np.ndarray) -> CablePlatform:
     """The platform at rest at home, from the declaration alone."""
     lines = robot.profile.line
-    body = Body(
+    body = RigidBody(
         robot.platform.mass,
         np.zeros(3),
         np.diag([5.0, 5.0, 6.0]),

@@ -25,12 +25,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.estimation import DahlEstimator, PulleyGroup
-from winchkit.estimation.dahl_identification import Record, identify_dahl
+from winchkit.estimation.dahl_identification import PulleyRecord, identify_dahl
 from winchkit.estimation.metrics import mean_relative_error, overshoot
 from winchkit.model.pulleys import Bearings, over_pulleys
 from winchkit.model.trajectory import plan
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 Array = np.ndarray
 GRAVITY = 9.80665
@@ -123,7 +123,7 @@ class Winch:
         Before the first sample the cable has come some way from somewhere.
         """
         pulleys = [PreslidingPulleys(*numbers, self.shape) for numbers in self.numbers]
-        state, out = State(), []
+        state, out = PlantState(), []
         approach = np.full(100, self.rng.uniform(-APPROACH, APPROACH) / 100)
         moved = np.concatenate([approach, -np.diff(length, prepend=length[0])])
         loads = np.concatenate([np.full(100, platform[0]), platform])
@@ -163,7 +163,7 @@ def measure(
         winch = Winch(rng, rub)
         cell, wound = winch.readings(taught[:, k], taught_lengths[:, k])
         (group,) = identify_dahl(
-            [Record(cell, taught[:, k], wound)], [WRAPS], shape=rub.shape
+            [PulleyRecord(cell, taught[:, k], wound)], [WRAPS], shape=rub.shape
         ).groups
         learned.append(group)
         cell, wound = winch.readings(tensions[:, k], lengths[:, k])

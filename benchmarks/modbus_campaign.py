@@ -28,7 +28,7 @@ from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.reading import InstrumentReading
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.read import read_device
@@ -74,7 +74,7 @@ class Judge:
     flags: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
 
-    def __call__(self, reading: Reading) -> None:
+    def __call__(self, reading: InstrumentReading) -> None:
         """Take in a reading."""
         self.readings += 1
         self.flags.update(str(reading.quality).split(", "))

@@ -29,7 +29,7 @@ from playwright.sync_api import Error, sync_playwright
 
 from winchkit import write_run
 from winchkit.catalog import find
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.sim.bench import profiles_of
 from winchkit.sim.record import simulate
@@ -128,9 +128,9 @@ def programme(samples: int) -> tuple[Programme, float]:
     """Strokes under two loads, twice, and the rate (Hz) at which they have that many samples."""
     steps = []
     for mass in LOADS:
-        steps.append(Step(ask=f"hang the {mass:g} kg load", load_mass=mass))
+        steps.append(ProgrammeStep(ask=f"hang the {mass:g} kg load", load_mass=mass))
         for to in (2.8, 1.5, 2.2, 1.0, 1.5):
-            steps.append(Step(to=to, speed=0.5, acceleration=0.8))
+            steps.append(ProgrammeStep(to=to, speed=0.5, acceleration=0.8))
     found = Programme("strokes", tuple(steps), repeat=2)
     bench = read_simbench(find("sim", EXAMPLE))
     rows = sum(len(run) for run in simulate(bench, profiles_of(bench), found, seed=1))

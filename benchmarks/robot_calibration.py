@@ -29,7 +29,7 @@ from winchkit.catalog import find
 from winchkit.robot import Robot, robot_of
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
 
@@ -38,7 +38,7 @@ ROUNDS = 5
 PARAMETERS = 65
 
 
-def measured_of(robot: Robot, text: str) -> Measured:
+def measured_of(robot: Robot, text: str) -> MeasuredPoses:
     """Poses as they are read from a run's file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "poses.csv"
@@ -46,7 +46,7 @@ def measured_of(robot: Robot, text: str) -> Measured:
         return read_poses([read_run(path)], robot.profile)
 
 
-def fastest(robot: Robot, fit: Measured, held: Measured) -> tuple[float, Calibrated]:
+def fastest(robot: Robot, fit: MeasuredPoses, held: MeasuredPoses) -> tuple[float, Calibrated]:
     """Least wall time of several calibrations, and the last one."""
     found = calibrate(robot, fit, held)
     seconds = found.seconds
@@ -66,7 +66,7 @@ def shaken(robot: Robot, rng: random.Random) -> Robot:
     return robot_of(replace(robot.profile, line=tuple(lines)))
 
 
-def starts_that_converge(robot: Robot, fit: Measured, held: Measured, count: int) -> int:
+def starts_that_converge(robot: Robot, fit: MeasuredPoses, held: MeasuredPoses, count: int) -> int:
     """How many of random starts end within 0.05 mm of poses that were not fitted."""
     rng = random.Random(5)
     # Starts lie about the truth's own points, and the prior has to reach across.
@@ -89,7 +89,7 @@ def truth_as(robot: Robot) -> Robot:
     return robot_of(replace(robot.profile, line=lines))
 
 
-def nested_seconds(robot: Robot, fit: Measured, columns: int) -> float:
+def nested_seconds(robot: Robot, fit: MeasuredPoses, columns: int) -> float:
     """One outer Jacobian of the nested method, from ``columns`` of its columns."""
     problem = NestedProblem(fit.motor_angle, fit.position)
     values = nominal(robot.geometry.exit_point, robot.geometry.anchor_point)

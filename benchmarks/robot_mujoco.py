@@ -27,7 +27,7 @@ from winchkit import find
 from winchkit.arrays import Array
 from winchkit.robot.dynamics.integration import ElasticCables, integrate
 from winchkit.robot.geometry.kinematics import Geometry, Pose, geometry_of, home_of, lengths
-from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
+from winchkit.robot.sim.platform import CablePlatform, Pulleys, RigidBody
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.read import read_robot
 
@@ -249,7 +249,7 @@ class Oracle:
 def simulated(robot: Robot, unstrained: CubicSpline, time: Array, start: Array) -> Motion:
     """The simulator's platform."""
     case, geometry, platform = robot.case, robot.geometry, robot.platform
-    body = Body(
+    body = RigidBody(
         platform.mass,
         np.array(case.center_of_mass),
         np.diag(case.inertia),

@@ -31,7 +31,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.catalog import find
 from winchkit.estimation import DahlEstimator, PulleyGroup
-from winchkit.estimation.dahl_identification import Record, identify_dahl
+from winchkit.estimation.dahl_identification import PulleyRecord, identify_dahl
 from winchkit.model.pulleys import Bearings, over_pulleys
 from winchkit.robot.bench.planner import moved
 from winchkit.schema.read import read_profile, read_simbench
@@ -139,7 +139,7 @@ def measure(
     for k in range(cables):
         cell, length, _, true = taught[:, :, k]
         platform = true + random.normal(0, CELL_NOISE, len(true))
-        found = identify_dahl([Record(cell, platform, length[0] - length)], [wraps])
+        found = identify_dahl([PulleyRecord(cell, platform, length[0] - length)], [wraps])
         groups.append(found.groups[0])
         for name, value in estimates(found.groups[0], judged[:, :, k]).items():
             errors[name].append(value - judged[3, :, k])

@@ -26,7 +26,7 @@ from winchkit.model.rotation import rotation_by
 from winchkit.robot import (
     PLAIN,
     DynamicsCycle,
-    Linear,
+    LinearLaw,
     Pose,
     Robot,
     RobotCycle,
@@ -95,7 +95,7 @@ def one_by_one(robot: Robot, kernels: RobotKernels, name: str) -> dict[str, floa
         robot.structure(robot.home), robot.weight(robot.home), np.full(count, MIDDLE_FORCE)
     )[0]
     stretch = ElongationCorrection(
-        robot, [Linear(STIFFNESS)] * count, robot.home, initial, kernels=kernels
+        robot, [LinearLaw(STIFFNESS)] * count, robot.home, initial, kernels=kernels
     )
     there = poses(robot, 1)
     pose, strains = kernels.array(flat_pose(there)), kernels.array([1e-4] * count)

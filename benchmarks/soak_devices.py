@@ -15,7 +15,7 @@ from typing import Any
 from winchkit.catalog import find
 from winchkit.schema.read import read_device
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
-from winchkit.sim.instruments.modbus_line import ModbusLine
+from winchkit.sim.instruments.modbus_line import SimulatedModbusLine
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 
@@ -75,7 +75,7 @@ def serve(ours: Connection, winches: int, path: str, host: str, realtime: bool) 
         unit: ModbusInstrument(device.modbus, in_unit_of(device.modbus, lambda: _TENSION), now=now)
         for unit in range(1, winches + 1)
     }
-    line = ModbusLine(cells, nullcontext)
+    line = SimulatedModbusLine(cells, nullcontext)
     line.start()
     slaves = [
         Slave.from_file(_EDS, node, declared=Declared(disabled_deceleration=1000.0))

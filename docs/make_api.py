@@ -17,14 +17,20 @@ SECTIONS = {
     "Instruments": (
         *("cell_info", "cell_rate", "cell_health", "cell_tare", "cell_zero", "cell_store"),
         *("recorded_cell_health", "CellFindings"),
-        *("read_points", "fit_cell", "static_effects"),
+        *("CellInfo", "CellRate", "CellTare", "read_points", "fit_cell", "static_effects"),
     ),
     "Drives": (
         *("can_bus", "scan", "drive_info", "bus_load"),
         *("config_save", "config_diff", "config_load", "config_store", "config_restore"),
         *("lss_list", "lss_identify", "lss_set"),
     ),
-    "A simulated bench": ("LiveBench", "SimulatedClock", "simulate", "listed_benches"),
+    "A simulated bench": (
+        "LiveBench",
+        "SimulatedClock",
+        "simulate",
+        "listed_benches",
+        "ListedBench",
+    ),
     "Files": (
         *("find", "check", "read_profile", "read_size"),
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
@@ -48,7 +54,13 @@ SECTIONS = {
     "Cable robots: winchkit.robot": (
         *("read_robot", "robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits"),
         *("read_poses", "calibrate", "next_poses", "write_calibrated"),
-        *("self_calibrated", "ComputationProcess", "Tracker", "PoseVolume", "SelfCalibration"),
+        *(
+            "self_calibrated",
+            "ComputationProcess",
+            "TrackerReceiver",
+            "PoseVolume",
+            "SelfCalibration",
+        ),
         "ElongationCorrection",
     ),
     "Many winches: winchkit.fleet": (

@@ -36,7 +36,7 @@ RESULTS = {
     "winchkit.diagnosis.add": ("Addition", "Removal"),
     "winchkit.diagnosis.diagnose": ("Answer", "WinchAnswer"),
     "winchkit.diagnosis.plan": ("Plan", "WinchPlan"),
-    "winchkit.diagnosis.residuals.traces": ("PoseTrace", "Trace"),
+    "winchkit.diagnosis.residuals.traces": ("OutputTrace", "PoseTrace"),
     "winchkit.diagnosis.residuals.attribution": ("Attribution",),
     "winchkit.diagnosis.results": (
         *("CandidateScore", "Combination", "Comparison", "Detectable", "Diagnosis", "Doubt"),

@@ -271,7 +271,7 @@ def test_windows_simulates_no_serial_line(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(ConnectionLost, match="Modbus over TCP"):
         modbus_line.PtyCable()
     with pytest.raises(ConnectionLost, match="Linux or macOS"):
-        stream_line.StreamLine((), nullcontext, float).start()
+        stream_line.SimulatedStreamLine((), nullcontext, float).start()
 
 
 def test_socketcan_elsewhere_names_the_adapters_interfaces(

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         cell_tare,
         cell_zero,
     )
+    from winchkit.bench.cells.results import CellInfo, CellRate, CellTare
     from winchkit.bench.commissioning.procedure import commission
     from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.bench.drives.calls import (
@@ -100,7 +101,7 @@ if TYPE_CHECKING:
         read_simbench,
         read_size,
     )
-    from winchkit.sim.bench import listed_benches
+    from winchkit.sim.bench import ListedBench, listed_benches
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
     from winchkit.sim.record import simulate
@@ -110,6 +111,9 @@ __all__ = [
     "Bench",
     "BenchSnapshot",
     "CellFindings",
+    "CellInfo",
+    "CellRate",
+    "CellTare",
     "ConnectionLost",
     "DahlEstimator",
     "DecodedTrace",
@@ -119,6 +123,7 @@ __all__ = [
     "Fault",
     "FileError",
     "LimitTripped",
+    "ListedBench",
     "LiveBench",
     "MotionError",
     "NoReply",
@@ -209,6 +214,7 @@ _NAMES = {
         "cell_tare",
         "cell_zero",
     ),
+    "winchkit.bench.cells.results": ("CellInfo", "CellRate", "CellTare"),
     "winchkit.bench.commissioning.procedure": ("commission",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),
     "winchkit.bench.drives.calls": (
@@ -285,7 +291,7 @@ _NAMES = {
         "read_simbench",
         "read_size",
     ),
-    "winchkit.sim.bench": ("listed_benches",),
+    "winchkit.sim.bench": ("ListedBench", "listed_benches"),
     "winchkit.sim.clock.simulated_clock": ("SimulatedClock",),
     "winchkit.sim.live.bench": ("LiveBench",),
     "winchkit.sim.record": ("simulate",),

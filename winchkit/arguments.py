@@ -21,7 +21,7 @@ _CALLS = {
     "Calibrated": "calibrate(robot, fit)",
     "CalibrationPoint": "read_points(path)",
     "Log": "read_log(paths)",
-    "Measured": "read_poses(runs, profile)",
+    "MeasuredPoses": "read_poses(runs, profile)",
     "Programme": "read_programme(path)",
     "Removal": "remove(effect, runs, profile)",
     "Robot": "robot_of(profile)",
@@ -30,7 +30,7 @@ _CALLS = {
     "Run": "read_run(path)",
     "SimBench": "read_simbench(path)",
     "SizeSpec": "read_size(path)",
-    "Tracker": "Tracker(now)",
+    "TrackerReceiver": "TrackerReceiver(now)",
     "WinchAnswer": "diagnose(runs, profile)",
     "WinchProfile": "read_profile(path)",
 }

@@ -58,7 +58,7 @@ class TraceFrame:
 
 
 @dataclass(frozen=True)
-class Trace:
+class CanTrace:
     """Content of a trace."""
 
     path: str
@@ -100,7 +100,7 @@ def is_trace(data: bytes) -> bool:
     return data.startswith(b"LOGG") or is_can_trace(data[:TRACED].decode("latin-1").splitlines())
 
 
-def read_trace(path: str | Path) -> Trace:
+def read_trace(path: str | Path) -> CanTrace:
     """Read the data frames of a trace.
 
     Returns: frames in the order of the file, with times in s. Remote and error frames are counted
@@ -125,7 +125,7 @@ def read_trace(path: str | Path) -> Trace:
     return _read_text(name, data.decode("utf-8-sig", errors="replace").splitlines())
 
 
-def _read_blf(name: str, data: bytes) -> Trace:
+def _read_blf(name: str, data: bytes) -> CanTrace:
     import can
 
     frames: list[TraceFrame] = []
@@ -148,10 +148,10 @@ def _read_blf(name: str, data: bytes) -> Trace:
     if len(frames) + others < declared:
         count = f"{len(frames) + others} of {declared}"
         notes.append(f"{count} objects are CAN frames: it has others too, or is cut off")
-    return Trace(name, "BLF", tuple(frames), tuple(notes))
+    return CanTrace(name, "BLF", tuple(frames), tuple(notes))
 
 
-def _read_text(name: str, lines: Sequence[str]) -> Trace:
+def _read_text(name: str, lines: Sequence[str]) -> CanTrace:
     layout, read, notes = _format_of(lines)
     frames: list[TraceFrame] = []
     others: list[int] = []
@@ -184,7 +184,7 @@ def _read_text(name: str, lines: Sequence[str]) -> Trace:
         notes.append(f"lines that are no frames: {len(after)}, the first is {after[0]}, {shown!r}")
     if without_data:
         notes.append(f"remote and error frames, left out: {without_data}")
-    return Trace(name, layout, tuple(_in_time(frames, layout, lines, notes)), tuple(notes))
+    return CanTrace(name, layout, tuple(_in_time(frames, layout, lines, notes)), tuple(notes))
 
 
 def _format_of(lines: Sequence[str]) -> tuple[str, Callable[[str], TraceLine | None], list[str]]:

@@ -37,7 +37,7 @@ _SIGNS = str.maketrans("-", "−")
 
 
 @dataclass(frozen=True)
-class Scale:
+class PrintScale:
     """A unit in which values are printed."""
 
     label: str
@@ -61,16 +61,16 @@ class Scale:
         return f"{number}{self.label}" if tight else f"{number} {self.label}"
 
 
-def scale_for(sizes: float | Sequence[float], unit: str) -> Scale:
+def scale_for(sizes: float | Sequence[float], unit: str) -> PrintScale:
     """The scale for the largest of some SI values; an unknown unit is kept."""
     values = [sizes] if isinstance(sizes, int | float) else sizes
     size = max((abs(v) for v in values if isfinite(v)), default=0.0)
     ladder = _LADDERS.get(unit, ((float("inf"), unit, 1.0),))
     if size == 0.0:
         label, worth = next(((n, w) for _, n, w in ladder if w == 1.0), ladder[-1][1:])
-        return Scale(label, worth)
+        return PrintScale(label, worth)
     label, worth = next((n, w) for below, n, w in ladder if size < below)
-    return Scale(label, worth)
+    return PrintScale(label, worth)
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
@@ -81,7 +81,7 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return scale_for(value, unit).text(value, digits)
 
 
-def with_std(value: float, std: float, unit: str, scale: Scale | None = None) -> str:
+def with_std(value: float, std: float, unit: str, scale: PrintScale | None = None) -> str:
     """Value and standard deviation, the latter to two digits: ``247.4 ± 6.1 kN``.
 
     Without a deviation (NaN or zero) the value alone, to three digits. The scale is that of the

@@ -33,7 +33,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.socketcan import SocketCan
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.effects import line_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec, LimitSpec
@@ -82,14 +82,14 @@ class Cell:
     clock: Clock
     problem: ConnectionLost | None = None
     max_age: float = math.inf
-    _newest: Reading | None = None
+    _newest: InstrumentReading | None = None
 
     @property
-    def latest(self) -> Reading:
+    def latest(self) -> InstrumentReading:
         """A reading of 100 N."""
         now, newest = self.clock.now(), self._newest
         if newest is None or now - newest.t_receive >= _CELL_PERIOD:
-            newest = Reading(100.0, 100.0, 10_000.0, Quality.GOOD, now, now, now, 1e-3)
+            newest = InstrumentReading(100.0, 100.0, 10_000.0, Quality.GOOD, now, now, now, 1e-3)
             self._newest = newest
         return newest
 

@@ -13,7 +13,7 @@ from canopen.profiles.p402 import BaseNode402
 from winchkit import catalog
 from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec
 from winchkit.drivers.can.cia402.feedback import Gathering
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.schema.devices.servo import PdoSpec
 
 NODE = 1
@@ -34,7 +34,7 @@ def ours() -> dict[str, Round]:
     for number, objects in MAPPED:
         spec = PdoSpec(number, tuple(f"0x{index:04X}" for index, _, _ in objects))
         codecs.append(PdoCodec(spec, [MappedObject(i, 0, b, s) for i, b, s in objects]))
-    gathering = Gathering(codecs, Scale(1e-4, 1e-4, 2e-3), 0.004)
+    gathering = Gathering(codecs, CountScale(1e-4, 1e-4, 2e-3), 0.004)
     receive = [gathering.receiver(codec) for codec in codecs]
     decode = [codec.decode for codec in codecs]
 

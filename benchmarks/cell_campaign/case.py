@@ -18,7 +18,7 @@ from winchkit import catalog
 from winchkit.drivers.counters import Counters
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.reading import InstrumentReading
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
@@ -152,7 +152,7 @@ async def _play(plan: Plan, loop: WarpLoop) -> Outcome:
 def _judge(outcome: Outcome, device: Device, unit: int):  # type: ignore[no-untyped-def]  # noqa: ANN202
     """Compare each reading with what the device showed between request and answer."""
 
-    def judge(reading: Reading) -> None:
+    def judge(reading: InstrumentReading) -> None:
         if unit == _BYSTANDER:
             outcome.bystander += 1
             gap = reading.t_receive - outcome._last

@@ -25,9 +25,9 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.open import open_bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive.drive import SimDrive
-from winchkit.sim.drive.nmt import NmtState
+from winchkit.sim.drive.nmt import NodeState
 from winchkit.sim.drive.power import Order
-from winchkit.sim.drive.power import State as SimState
+from winchkit.sim.drive.power import PowerState as SimState
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.buses import Carried
 from winchkit.sim.live.paced_clock import PacedClock
@@ -167,7 +167,7 @@ def _hears(drive: SimDrive | IndependentDrive, carried: Carried) -> bool:
     """Whether a drive takes a frame: not off the bus, nor while it boots."""
     if isinstance(drive, IndependentDrive):
         return drive.hears(carried.identifier, carried.data)
-    return not drive._line.cut and drive.nmt is not NmtState.BOOTING
+    return not drive._line.cut and drive.nmt is not NodeState.BOOTING
 
 
 def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bool, float]:

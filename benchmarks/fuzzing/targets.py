@@ -12,15 +12,15 @@ import numpy as np
 
 from winchkit.calibration.cell.files import read_points
 from winchkit.catalog import find, folder, names
-from winchkit.drivers.modbus.decoder import Decoder
+from winchkit.drivers.modbus.decoder import RegisterDecoder
 from winchkit.drivers.modbus.frames import AnswerGate, Framing, crc16
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.reading import Quality
-from winchkit.drivers.stream.decoder import Meaning
+from winchkit.drivers.stream.decoder import FrameType
 from winchkit.drivers.stream.parser import StreamParser
 from winchkit.errors import WinchkitError
 from winchkit.runs.info import info_of
-from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recover import recover
@@ -79,16 +79,18 @@ def file_targets(scratch: Path) -> Iterator[Target]:
 
 def a_log(path: Path) -> bytes:
     """A short log of one winch, as the recorder writes it."""
-    motor = Source("/A/drive", (Signal("motor_angle", "rad", "motor_angle"),), 0.1)
-    cell = Source("/A/cell", (Signal("tension", "N", "tension"), Signal("quality", "1")), 0.1)
+    motor = SignalSource("/A/drive", (SourceSignal("motor_angle", "rad", "motor_angle"),), 0.1)
+    cell = SignalSource(
+        "/A/cell", (SourceSignal("tension", "N", "tension"), SourceSignal("quality", "1")), 0.1
+    )
     layout = Layout((motor, cell), RowRule("/A/cell", 0.0), 1_700_000_000_000_000_000)
     times = np.arange(4) / 100
     values = np.stack([times, times], axis=1)
     log = open_log(path, layout, {"load_mass": "15 kg"}, None)
     log.write(
         {
-            "/A/drive": Samples(times, times, values[:, :1]),
-            "/A/cell": Samples(times, times, values),
+            "/A/drive": SourceSamples(times, times, values[:, :1]),
+            "/A/cell": SourceSamples(times, times, values),
         },
         times[-1],
     )
@@ -174,7 +176,7 @@ def stream_target(device: DeviceSpec) -> Target:
         if repr(said) != repr(again) or whole.counts != parts.counts:
             raise Failure("chunks matter")
         for heard in said:
-            if heard.decoded is not None and heard.meaning is Meaning.READING:
+            if heard.decoded is not None and heard.meaning is FrameType.READING:
                 sound(heard.decoded.value, heard.decoded.quality)
 
     seeds = tuple(b"\x01" + text + end for text in (example, example + end + example, *words))
@@ -183,7 +185,7 @@ def stream_target(device: DeviceSpec) -> Target:
 
 def modbus_target(device: DeviceSpec) -> Target:
     """A Modbus instrument: whatever stands in its registers."""
-    decoder = Decoder(device)
+    decoder = RegisterDecoder(device)
     own = decoder.spec.read.count
     block = decoder.spec.status_read
     count = own + (block.count if block else 0)

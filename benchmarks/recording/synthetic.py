@@ -22,7 +22,7 @@ from winchkit.bench.control.snapshot import BenchSnapshot, Phase, WinchSnapshot
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.counters import Counters
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import ConnectionLost
 from winchkit.runs.recording.rotation import Rotation
 
@@ -39,16 +39,16 @@ class Cell:
     name: str
     period: float = CYCLE * EVERY
     max_age: float = 1.0
-    latest: Reading | None = None
+    latest: InstrumentReading | None = None
     problem: ConnectionLost | None = None
     counters: Counters = field(default_factory=Counters)
     tared: bool | None = None
     host_tare: float = 0.0
-    listeners: list[Callable[[Reading], None]] = field(default_factory=list)
+    listeners: list[Callable[[InstrumentReading], None]] = field(default_factory=list)
 
     def read(self, value: float, now: float) -> None:
         """Give a reading to everybody who listens."""
-        reading = Reading(
+        reading = InstrumentReading(
             value=value,
             gross=value,
             raw=round(value * 100),

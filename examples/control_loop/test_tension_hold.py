@@ -12,7 +12,7 @@ import pytest
 from tension_hold import FASTEST, hold, speed_for
 
 from winchkit.testing.opened import OpenedBench
-from winchkit.testing.plugin import SimBench
+from winchkit.testing.plugin import SimBenchFixture
 
 CHAIN = "heavy rope, mass_per_length=10 kg/m"
 """The simulated chain, with 10 kg at its end."""
@@ -20,7 +20,7 @@ WINCH = {"limits": {"tension_high": "800 N", "speed": "0.5 m/s"}}
 
 
 @pytest.fixture
-def sim(sim_bench: SimBench) -> OpenedBench:
+def sim(sim_bench: SimBenchFixture) -> OpenedBench:
     """A winch with a chain, opened for a test."""
     return sim_bench(winches={"A": WINCH}, hidden=[CHAIN])
 

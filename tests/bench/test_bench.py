@@ -33,7 +33,7 @@ from winchkit.errors import (
 )
 from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
@@ -305,15 +305,15 @@ def test_a_programme_writes_a_run_per_load_and_repeat(
     bench: Bench, live: LiveBench, tmp_path: Path
 ) -> None:
     steps = (
-        Step(ask="hang 10 kg", load_mass=10.0),
-        Step(by=-0.1, speed=0.3),
-        Step(hold=0.2),
-        Step(ask="hang 20 kg", load_mass=20.0),
-        Step(by=0.1, speed=0.3),
+        ProgrammeStep(ask="hang 10 kg", load_mass=10.0),
+        ProgrammeStep(by=-0.1, speed=0.3),
+        ProgrammeStep(hold=0.2),
+        ProgrammeStep(ask="hang 20 kg", load_mass=20.0),
+        ProgrammeStep(by=0.1, speed=0.3),
     )
     asked: list[str] = []
 
-    def hang(step: Step) -> None:
+    def hang(step: ProgrammeStep) -> None:
         assert bench.snapshot.at_rest
         asked.append(str(step.ask))
         live.answer(step)
@@ -338,7 +338,7 @@ def test_the_first_repeat_begins_where_repeats_end(
     bench: Bench, live: LiveBench, tmp_path: Path
 ) -> None:
     """A run of a programme is a motion of its own, wherever the winch stood before."""
-    steps = (Step(to=3.7, speed=0.4), Step(to=3.85, speed=0.4))
+    steps = (ProgrammeStep(to=3.7, speed=0.4), ProgrammeStep(to=3.85, speed=0.4))
     written = run_programme(bench, Programme("same", steps, repeat=2), tmp_path, live.answer)
     first, second = (read_run(path) for path in written)
     begins = [float(run["motor_angle"][0]) for run in (first, second)]
@@ -351,10 +351,10 @@ def test_a_question_of_temperature_is_answered_by_the_simulation(
     bench: Bench, live: LiveBench, tmp_path: Path
 ) -> None:
     steps = (
-        Step(ask="bring rope and machine to 20 degC", temperature=20.0),
-        Step(by=-0.1, speed=0.3),
-        Step(ask="bring rope and machine to 35 degC", temperature=35.0),
-        Step(by=0.1, speed=0.3),
+        ProgrammeStep(ask="bring rope and machine to 20 degC", temperature=20.0),
+        ProgrammeStep(by=-0.1, speed=0.3),
+        ProgrammeStep(ask="bring rope and machine to 35 degC", temperature=35.0),
+        ProgrammeStep(by=0.1, speed=0.3),
     )
     written = run_programme(bench, Programme("warm", steps), tmp_path, live.answer)
     means = [float(np.nanmean(read_run(path)["temperature"])) for path in written]
@@ -364,7 +364,7 @@ def test_a_question_of_temperature_is_answered_by_the_simulation(
 def test_what_stops_a_programme_keeps_its_log(
     bench: Bench, live: LiveBench, tmp_path: Path
 ) -> None:
-    programme = Programme("cut", (Step(to=2.0, speed=0.2),))
+    programme = Programme("cut", (ProgrammeStep(to=2.0, speed=0.2),))
     stopper = threading.Timer(1.0, bench.stop_now)
     stopper.start()
     with pytest.raises(MotionError):

@@ -10,20 +10,20 @@ from hypothesis import strategies as st
 
 from fake_axis import CYCLE, Rig, StraightLine
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Jog, Move, StartGate
+from winchkit.bench.control.motion import Jog, PlannedMove, StartGate
 from winchkit.bench.control.snapshot import Phase
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.schema.bench import LimitSpec
 
 LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))
 STOPPING = {0x00, 0x02}
 
 
-def begin(rig: Rig, targets: dict[str, float], *, holds: bool = False) -> dict[str, Move]:
+def begin(rig: Rig, targets: dict[str, float], *, holds: bool = False) -> dict[str, PlannedMove]:
     """What ``Bench.move_together`` does, on a rig."""
     moves = {}
     for name, length in targets.items():
-        moves[name] = Move(StraightLine(), LIMITS, length, holds=holds)
+        moves[name] = PlannedMove(StraightLine(), LIMITS, length, holds=holds)
         moves[name].prepare(rig.axes[name].angle)
     longest = max(move.duration for move in moves.values())
     gate = StartGate([partial(rig.controller(n).ready_for, m) for n, m in moves.items()])
@@ -38,7 +38,7 @@ def speeds(rig: Rig, duration: float, held_back: str = "") -> dict[str, list[flo
     seen: dict[str, list[float]] = {name: [] for name in rig.axes}
     for _ in range(round(duration / CYCLE)):
         if held_back:
-            rig.axes[held_back].state = State.READY_TO_SWITCH_ON
+            rig.axes[held_back].state = DriveState.READY_TO_SWITCH_ON
         rig.step()
         for name, axis in rig.axes.items():
             seen[name].append(axis.velocity)
@@ -115,7 +115,7 @@ def test_a_drive_that_gives_up_takes_the_others_down_in_the_next_cycle(together:
     rig.loop._stop_together = together
     begin(rig, {"A": 1.0, "B": 8.0})
     speeds(rig, 1.0)
-    rig.axes["B"].state = State.READY_TO_SWITCH_ON
+    rig.axes["B"].state = DriveState.READY_TO_SWITCH_ON
     before = len(rig.axes["A"].words)
     rig.step(4)
     words = set(rig.axes["A"].words[before + 2 :])

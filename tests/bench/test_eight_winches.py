@@ -14,7 +14,7 @@ from winchkit.bench.control.snapshot import Phase
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
-from winchkit.sim.live.buses import Carried, Wire
+from winchkit.sim.live.buses import BusWire, Carried
 
 NAMES = "ABCDEFGH"
 SYNC, RPDO = 0x080, 0x200
@@ -23,7 +23,7 @@ SYNC, RPDO = 0x080, 0x200
 class Witness:
     """Writes down what is spoken on a bus; a context manager."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: BusWire) -> None:
         self._wire = wire
         self.frames: list[tuple[int, bytes]] = []
 

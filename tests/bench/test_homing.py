@@ -10,7 +10,7 @@ import pytest
 from fake_axis import CYCLE, StraightLine
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.homing_motion import HomingMotion
-from winchkit.drivers.can.cia402.modes import Homing
+from winchkit.drivers.can.cia402.modes import HomingState
 
 ARM = 0.005
 
@@ -19,7 +19,7 @@ ARM = 0.005
 class Searching:
     """A drive's word on its homing."""
 
-    homing: Homing = Homing.RUNNING
+    homing: HomingState = HomingState.RUNNING
 
 
 def search(
@@ -38,13 +38,13 @@ def search(
 
 
 def test_a_homing_of_before_counts_only_after_a_while() -> None:
-    motion, cycles = search(Searching(Homing.DONE))
+    motion, cycles = search(Searching(HomingState.DONE))
     assert not motion.failure
     assert 0.05 < cycles * CYCLE < 0.1
 
 
 def test_a_drive_that_fails_is_accepted() -> None:
-    motion, _ = search(Searching(Homing.FAILED))
+    motion, _ = search(Searching(HomingState.FAILED))
     assert "failed" in motion.failure
 
 

@@ -13,7 +13,7 @@ from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.programme import run_programme
 from winchkit.errors import MotionError, NotPermitted
 from winchkit.runs import read_run
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
@@ -41,10 +41,14 @@ def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
     live: LiveBench, bench: Bench, tmp_path: Path
 ) -> None:
     """The winch stands then, so that the stop ends no motion; the next one must not begin."""
-    steps = (Step(by=-0.1, speed=0.4), Step(hold=2.0), Step(by=-0.5, speed=0.4))
+    steps = (
+        ProgrammeStep(by=-0.1, speed=0.4),
+        ProgrammeStep(hold=2.0),
+        ProgrammeStep(by=-0.5, speed=0.4),
+    )
     plant, places = live.winches["A"].plant, []
 
-    def stop(_repeat: int, _number: int, step: Step) -> None:
+    def stop(_repeat: int, _number: int, step: ProgrammeStep) -> None:
         if step.hold is not None:
             places.append(plant.cable_length)
             bench.stop_now()
@@ -62,7 +66,7 @@ def test_a_programme_that_is_refused_writes_no_file(
 ) -> None:
     """An empty run would have to be removed before the next attempt."""
     monkeypatch.setattr(bench, "not_commissioned", "there is no commissioning record")
-    steps = (Step(by=-0.1, speed=0.4),)
+    steps = (ProgrammeStep(by=-0.1, speed=0.4),)
     begun = []
     with pytest.raises(NotPermitted, match="no commissioning record"):
         run_programme(

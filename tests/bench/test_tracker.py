@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from winchkit.bench.tracker import TrackedPose, Tracker, mean_pose, parse_pose
+from winchkit.bench.tracker import TrackedPose, TrackerReceiver, mean_pose, parse_pose
 from winchkit.errors import ConnectionLost, NoReply
 
 GOOD = {
@@ -54,7 +54,7 @@ def test_a_datagram_is_a_pose_with_both_times() -> None:
     ],
 )
 def test_what_is_no_pose_is_counted_with_its_reason(sent: bytes, reason: str) -> None:
-    tracker = Tracker(lambda: 0.0)
+    tracker = TrackerReceiver(lambda: 0.0)
     tracker.receive(datagram())
     tracker.receive(sent)
     assert (tracker.received, tracker.refused) == (1, 1)
@@ -63,7 +63,7 @@ def test_what_is_no_pose_is_counted_with_its_reason(sent: bytes, reason: str) ->
 
 @given(st.binary(max_size=3000))
 def test_no_bytes_end_the_receiver(sent: bytes) -> None:
-    tracker = Tracker(lambda: 0.0)
+    tracker = TrackerReceiver(lambda: 0.0)
     tracker.receive(sent)
     assert tracker.received + tracker.refused == 1
 
@@ -86,7 +86,7 @@ def test_the_mean_of_poses_is_that_of_their_rotations(seed: int, count: int) -> 
 
 
 def test_poses_come_by_udp_until_the_receiver_is_closed() -> None:
-    tracker = Tracker(time.monotonic)
+    tracker = TrackerReceiver(time.monotonic)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -94,7 +94,7 @@ def test_poses_come_by_udp_until_the_receiver_is_closed() -> None:
     tracker.listen(address)
     try:
         with pytest.raises(ConnectionLost, match="cannot receive"):
-            Tracker(time.monotonic).listen(address)
+            TrackerReceiver(time.monotonic).listen(address)
         with pytest.raises(NoReply, match="no pose came"):
             tracker.require(time.monotonic(), address)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

@@ -10,7 +10,7 @@ from bus_rig import HEARTBEAT, Rig
 from drive_server import HOST, NODE
 from master import Master
 from winchkit.drivers.can.canopen.nmt import NmtState
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 
 pytestmark = pytest.mark.realtime
 
@@ -69,7 +69,7 @@ def test_the_drives_watch_is_proved_before_it_may_be_enabled(rig: Rig) -> None:
         assert set(words) <= {0x00, 0x02}
         assert set(rig.states()) <= {"SWITCH_ON_DISABLED"}
         assert rig.drive.number(0x1016, 1) >> 16 == HOST
-        assert master.state is State.SWITCH_ON_DISABLED
+        assert master.state is DriveState.SWITCH_ON_DISABLED
         assert master.axis.operational
 
 
@@ -88,7 +88,7 @@ def test_a_boot_up_is_noticed_and_the_mapping_known_to_be_lost(rig: Rig, master:
     master.commission()
     master.cycles(RequestedState.DISABLE, 3)
     assert master.axis.operational
-    assert master.state is State.SWITCH_ON_DISABLED
+    assert master.state is DriveState.SWITCH_ON_DISABLED
     assert master.axis.feedback is not stale
 
 
@@ -100,7 +100,7 @@ def test_a_reset_of_its_communication_is_noticed_too(rig: Rig, master: Master) -
 
 
 def test_the_hosts_silence_stops_the_drive(rig: Rig, master: Master) -> None:
-    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, DriveState.OPERATION_ENABLED)
     master.cycles(RequestedState.ENABLE, 20, velocity=4.0)
     assert rig.drive.see()["velocity"] > 3.0
     master.cycles_silent(1)
@@ -133,10 +133,10 @@ def test_the_drives_silence_is_noticed(rig: Rig, master: Master) -> None:
     [("over-current", 0x2310), ("following error", 0x8611), ("under-voltage", 0x3220)],
 )
 def test_emergencies_arrive_in_words(rig: Rig, master: Master, kind: str, code: int) -> None:
-    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, DriveState.OPERATION_ENABLED)
     rig.forget()
     rig.drive.inject(kind)
-    master.until(RequestedState.DISABLE, State.FAULT)
+    master.until(RequestedState.DISABLE, DriveState.FAULT)
     master.cycles(RequestedState.DISABLE, 2)
     assert master.axis.emergencies[-1].code == code
     assert f"{code:04X}h" in master.axis.fault_text

@@ -9,7 +9,7 @@ import pytest
 from bus_rig import Rig
 from drive_server import NODE
 from master import Master
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import NotPermitted
 
 pytestmark = pytest.mark.realtime
@@ -27,13 +27,13 @@ def master(rig: Rig) -> Iterator[Master]:
 def test_states_and_transitions_one_by_one(rig: Rig, master: Master) -> None:
     master.commission()
     rig.forget()
-    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, DriveState.OPERATION_ENABLED)
     assert rig.states() == ["SWITCH_ON_DISABLED", "READY", "SWITCHED_ON", "OPERATION_ENABLED"]
     words = [word for word in rig.witness.words() if word & 0x8F]
     # The last word of one transition is repeated until the status word says that it is done.
     assert list(dict.fromkeys(words)) == [0x06, 0x07, 0x0F]
     rig.forget()
-    master.until(RequestedState.DISABLE, State.SWITCH_ON_DISABLED)
+    master.until(RequestedState.DISABLE, DriveState.SWITCH_ON_DISABLED)
     assert rig.states() == ["OPERATION_ENABLED", "QUICK_STOP_ACTIVE", "SWITCH_ON_DISABLED"]
     assert not UPWARDS & set(rig.witness.words()[1:])
 
@@ -67,16 +67,16 @@ def test_the_mode_is_verified_and_kept_under_watch(rig: Rig, master: Master) -> 
 @pytest.mark.parametrize(
     ("start", "way"),
     [
-        (State.SWITCH_ON_DISABLED, ()),
-        (State.READY_TO_SWITCH_ON, (0x06,)),
-        (State.SWITCHED_ON, (0x06, 0x07)),
-        (State.OPERATION_ENABLED, (0x06, 0x07, 0x0F)),
-        (State.QUICK_STOP_ACTIVE, (0x06, 0x07, 0x0F, 0x02)),
+        (DriveState.SWITCH_ON_DISABLED, ()),
+        (DriveState.READY_TO_SWITCH_ON, (0x06,)),
+        (DriveState.SWITCHED_ON, (0x06, 0x07)),
+        (DriveState.OPERATION_ENABLED, (0x06, 0x07, 0x0F)),
+        (DriveState.QUICK_STOP_ACTIVE, (0x06, 0x07, 0x0F, 0x02)),
     ],
-    ids=lambda item: str(item) if isinstance(item, State) else "",
+    ids=lambda item: str(item) if isinstance(item, DriveState) else "",
 )
 def test_a_stop_never_energises(
-    rig: Rig, master: Master, start: State, way: tuple[int, ...], requested: RequestedState
+    rig: Rig, master: Master, start: DriveState, way: tuple[int, ...], requested: RequestedState
 ) -> None:
     rig.drive.put(0x605A, 0, 6)  # stays in quick stop active
     master.commission()
@@ -95,21 +95,21 @@ def test_a_stop_never_energises(
 def test_a_stop_ends_disabled_whatever_605a_says(rig: Rig, master: Master, code: int) -> None:
     rig.drive.put(0x605A, 0, code)
     master.commission()
-    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, DriveState.OPERATION_ENABLED)
     master.cycles(RequestedState.ENABLE, 10, velocity=4.0)
     rig.forget()
-    master.until(RequestedState.DISABLE, State.SWITCH_ON_DISABLED)
+    master.until(RequestedState.DISABLE, DriveState.SWITCH_ON_DISABLED)
     assert set(rig.witness.words()[1:]) <= {0x00, 0x02}
     assert abs(rig.drive.see()["velocity"]) < 0.05
 
 
 def test_a_reset_of_a_fault_stays_disabled(rig: Rig, master: Master) -> None:
     master.commission()
-    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, DriveState.OPERATION_ENABLED)
     rig.drive.inject("over-current")
-    master.until(RequestedState.DISABLE, State.FAULT)
+    master.until(RequestedState.DISABLE, DriveState.FAULT)
     rig.forget()
-    master.until(RequestedState.RESET, State.SWITCH_ON_DISABLED)
+    master.until(RequestedState.RESET, DriveState.SWITCH_ON_DISABLED)
     master.cycles(RequestedState.RESET, 5)
     assert rig.state() == "SWITCH_ON_DISABLED"
     assert rig.states() == ["FAULT", "SWITCH_ON_DISABLED"]

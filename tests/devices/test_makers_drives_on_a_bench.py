@@ -13,7 +13,7 @@ from slave.held_key import HeldKey
 from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
 from winchkit.drivers.can.cia402.standstill import Standstill
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.errors import NotPermitted
 
 RPM = 2 * math.pi / 60
@@ -171,14 +171,14 @@ def test_a_counter_within_its_range_is_known_to_the_next_process(tmp_path: Path)
 @pytest.mark.parametrize("noise", [(0, 1, 0, -1), (1, -1), (1, 1, 0)])
 def test_one_rpm_of_noise_is_rest_where_whole_rpm_are_shown(noise: tuple[int, ...]) -> None:
     """606Ch in whole rpm: a count is 0.105 rad/s; the position stands still."""
-    standstill = Standstill(Scale(angle=1e-4, velocity=RPM, torque=1e-3))
+    standstill = Standstill(CountScale(angle=1e-4, velocity=RPM, torque=1e-3))
     still = [standstill.take(0.004 * k, 5.0, noise[k % len(noise)] * RPM) for k in range(50)]
     assert all(still)
 
 
 def test_a_speed_below_one_count_is_seen_by_the_position() -> None:
     """0.1 rad/s is shown as 0 or 1 rpm; in 0.1 s the motor has turned by 10 mrad."""
-    standstill = Standstill(Scale(angle=1e-4, velocity=RPM, torque=1e-3))
+    standstill = Standstill(CountScale(angle=1e-4, velocity=RPM, torque=1e-3))
     moving = [standstill.take(0.004 * k, 0.1 * 0.004 * k, RPM * (k % 2)) for k in range(200)]
     assert not any(moving[10:])
     at = 0.1 * 0.004 * 199

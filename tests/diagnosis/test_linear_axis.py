@@ -28,7 +28,7 @@ from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_profile
 from winchkit.web.curves import curves_of
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 MASS, VISCOSITY, FRICTION = 40.0, 120.0, 15.0
 """kg, N s/m, N."""
@@ -186,7 +186,7 @@ def test_commands_read_and_write_a_linear_axis(folder: Path) -> None:
 
 
 def test_the_page_is_in_newtons(folder: Path, tmp_path: Path) -> None:
-    page = Workspace(tmp_path)
+    page = DiagnoseView(tmp_path)
     try:
         paths = [folder / f"run{seed}.csv" for seed in (1, 2)]
         page.open(paths, str(folder / "linear.toml")).result()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from winchkit.drivers.counters import Tally
 from winchkit.drivers.publisher import FrozenDetector, HostScale, Publisher, Sampled
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 GOOD = Quality.GOOD
 NEAR = st.floats(-1000, 1000)
@@ -56,7 +56,7 @@ def test_a_flagged_value_is_no_number_whatever_the_device_says() -> None:
 
 
 def test_listeners_get_every_reading_and_repeats_are_counted() -> None:
-    publisher, heard = Publisher(100.0), list[Reading]()
+    publisher, heard = Publisher(100.0), list[InstrumentReading]()
     publisher.listeners.append(heard.append)
     for k, counts in enumerate((1.0, 1.0, 2.0, 2.0, 2.0)):
         publisher.publish(counts, counts, counts, GOOD, at(k * 0.01))

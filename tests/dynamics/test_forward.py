@@ -33,7 +33,7 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
 from winchkit.errors import RunError, UsageError
 from winchkit.model.stages import At
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of
 
@@ -186,7 +186,9 @@ integral_time = "20 ms"
 """
     profile = profile_of(tmp_path, WINCH + control, ("motor-coulomb", 'torque = "20 mN m"'))
     programme = Programme("up", (
-        Step(hold=0.2), Step(to=3.0, speed=0.5, acceleration=0.8), Step(hold=0.5),
+        ProgrammeStep(hold=0.2),
+        ProgrammeStep(to=3.0, speed=0.5, acceleration=0.8),
+        ProgrammeStep(hold=0.5),
     ))  # fmt: skip
     run = forward(profile, programme=programme, load_mass=MASS, rate=1000.0)
     assert run["cable_length"][-1] == pytest.approx(3.0, abs=1e-4)

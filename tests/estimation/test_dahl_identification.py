@@ -12,7 +12,7 @@ from winchkit.catalog import find
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation import DahlEstimator, Kernels
 from winchkit.estimation.dahl_identification import (
-    Record,
+    PulleyRecord,
     correlation_time,
     covariance_of,
     identify_dahl,
@@ -41,11 +41,11 @@ PROFILE = WinchProfile(
 ARM = float(np.hypot(0.06, 0.005 / (2 * pi)))
 
 
-def noisy(seed: int, noise: float = 0.5, seconds: float = 30.0, **physics: float) -> Record:
+def noisy(seed: int, noise: float = 0.5, seconds: float = 30.0, **physics: float) -> PulleyRecord:
     rng = np.random.default_rng(seed)
     _, platform, wound = wander(seconds)
     cell = cell_readings(platform, wound, **physics)  # type: ignore[arg-type]
-    return Record(cell + rng.normal(0, noise, len(cell)), platform, wound)
+    return PulleyRecord(cell + rng.normal(0, noise, len(cell)), platform, wound)
 
 
 @pytest.mark.parametrize("shape", [1.0, 1.5])
@@ -81,7 +81,7 @@ def test_two_groups_of_different_presliding_are_distinguished(kernels: Kernels) 
     rng = np.random.default_rng(5)
     far = cell_readings(platform, wound, (pi,), 0.02, 8000.0)
     cell = cell_readings(far, wound, (pi / 2,), 0.04, 300.0) + rng.normal(0, 0.2, len(far))
-    record = Record(cell, platform, wound)
+    record = PulleyRecord(cell, platform, wound)
     found = identify_dahl([record], [(pi / 2,), (pi,)], shape=1.0, kernels=kernels)
     near, other = found.groups
     assert near.friction == pytest.approx(0.04, rel=0.02)
@@ -105,7 +105,7 @@ def test_the_friction_at_the_start_is_found() -> None:
     _, platform, wound = wander(30.0)
     cell = cell_readings(platform, wound)
     cut = 700
-    record = Record(cell[cut:], platform[cut:], wound[cut:])
+    record = PulleyRecord(cell[cut:], platform[cut:], wound[cut:])
     found = identify_dahl([record], [WRAPS], shape=1.0)
     # The walk starts at the cell: friction counts along paying out.
     slide = sum(0.02 * 2 * sin(wrap / 2) for wrap in WRAPS) * cell[cut]
@@ -116,7 +116,7 @@ def test_the_friction_at_the_start_is_found() -> None:
 
 def test_a_cable_that_never_moves_identifies_nothing() -> None:
     rng = np.random.default_rng(0)
-    still = Record(300 + rng.normal(0, 1, 200), np.full(200, 300.0), np.zeros(200))
+    still = PulleyRecord(300 + rng.normal(0, 1, 200), np.full(200, 300.0), np.zeros(200))
     (group,) = identify_dahl([still], [WRAPS]).groups
     assert np.isnan(group.std[1])
     assert np.isnan(group.std[2])
@@ -124,12 +124,12 @@ def test_a_cable_that_never_moves_identifies_nothing() -> None:
 
 def test_too_little_is_refused() -> None:
     with pytest.raises(UsageError, match="at least 20 samples"):
-        identify_dahl([Record(*np.ones((3, 5)))], [WRAPS])
+        identify_dahl([PulleyRecord(*np.ones((3, 5)))], [WRAPS])
     with pytest.raises(UsageError, match="0 pulley groups"):
         identify_dahl([noisy(0, seconds=2.0)], [])
 
 
-def run_of(record: Record, **extra: np.ndarray) -> Run:
+def run_of(record: PulleyRecord, **extra: np.ndarray) -> Run:
     channels = {
         "motor_angle": Channel(record.wound / ARM * 20.0, "rad"),
         "tension": Channel(record.cell, "N"),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.model.derivatives import Clock, with_turning_points
+from winchkit.model.derivatives import SamplingTimes, with_turning_points
 
 
 @given(st.floats(0.02, 0.97), st.floats(0.5, 40.0))
@@ -48,4 +48,4 @@ def test_a_rest_is_no_turn() -> None:
 def test_differences_are_numpys_gradient_on_uneven_samples(count: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     time, x = np.cumsum(random.uniform(0.01, 0.03, count)), random.standard_normal(count)
-    assert Clock(time).differences(x) == pytest.approx(np.gradient(x, time), rel=1e-12)
+    assert SamplingTimes(time).differences(x) == pytest.approx(np.gradient(x, time), rel=1e-12)

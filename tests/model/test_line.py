@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from model_lines import line_with, profile_with, swing
-from winchkit.model.derivatives import Clock, direction
+from winchkit.model.derivatives import SamplingTimes, direction
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, Modifier, Signals, Stage
 from winchkit.schema.profiles.winch import (
@@ -212,11 +212,13 @@ def test_the_sharp_gradient_follows_a_ripple_and_keeps_straight_lines() -> None:
     even = np.arange(200) * 0.02
     uneven = even + random.uniform(-2e-3, 2e-3, 200)
     line = 3.0 - 2.0 * uneven
-    assert Clock(uneven).sharp_gradient(line) == pytest.approx(np.full(200, -2.0), abs=1e-9)
+    assert SamplingTimes(uneven).sharp_gradient(line) == pytest.approx(np.full(200, -2.0), abs=1e-9)
     ripple = np.sin(40.0 * even)
-    found = Clock(even).sharp_gradient(ripple)[3:-3]
+    found = SamplingTimes(even).sharp_gradient(ripple)[3:-3]
     assert found == pytest.approx(40.0 * np.cos(40.0 * even)[3:-3], abs=0.12)
     cubic = even**3 - even
     slope = 3 * even**2 - 1
-    assert Clock(even).sharp_gradient(cubic)[3:-3] == pytest.approx(slope[3:-3], abs=1e-9)
-    assert Clock(even[:5]).sharp_gradient(even[:5] ** 2)[1:-1] == pytest.approx(2 * even[1:4])
+    assert SamplingTimes(even).sharp_gradient(cubic)[3:-3] == pytest.approx(slope[3:-3], abs=1e-9)
+    assert SamplingTimes(even[:5]).sharp_gradient(even[:5] ** 2)[1:-1] == pytest.approx(
+        2 * even[1:4]
+    )

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.smoothing_spline import Design, SmoothingSpline
 
 RATE = 2 * np.pi / 5
@@ -81,7 +81,7 @@ def test_a_rounded_angle_has_at_least_the_noise_of_its_rounding() -> None:
 def test_even_samples_keep_their_differences() -> None:
     time = np.arange(200) / 50
     angle = np.sin(time) + 1e-3 * np.cos(20 * time)
-    clock = Clock(time, angle)
+    clock = SamplingTimes(time, angle)
     assert clock.spline is None
     assert clock.smoother is None
     assert clock.acceleration_std is None
@@ -93,7 +93,7 @@ def test_noise_of_even_samples_does_not_reach_the_acceleration() -> None:
     """By differences it would have 120 times the acceleration of the motion."""
     time = np.arange(5000) / 250
     angle = np.sin(time) + 1e-3 * np.random.default_rng(3).standard_normal(len(time))
-    clock = Clock(time, angle)
+    clock = SamplingTimes(time, angle)
     assert clock.spline is None
     inner = slice(250, -250)
     by_differences = np.gradient(np.gradient(angle, time), time)
@@ -183,11 +183,11 @@ def test_a_reported_velocity_takes_the_place_of_the_angle() -> None:
     random, time = np.random.default_rng(6), jittered(6)
     angle = np.sin(RATE * time) + 3e-3 * random.standard_normal(len(time))
     velocity = RATE * np.cos(RATE * time) + 1e-4 * random.standard_normal(len(time))
-    clock = Clock(time, angle, velocity)
+    clock = SamplingTimes(time, angle, velocity)
     assert clock.measured_rate is velocity
     exact = -(RATE**2) * np.sin(RATE * time)
     assert np.std(clock.acceleration - exact) < 0.2 * np.std(
-        Clock(time, angle).acceleration - exact
+        SamplingTimes(time, angle).acceleration - exact
     )
 
 

@@ -22,7 +22,7 @@ from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
 from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import lack_of_fit_test
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats
 from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.scores import Projected, null_maxima, score
@@ -70,10 +70,10 @@ def residuals(regression: TimeSeriesRegression, cases: int, seed: int) -> Iterat
         yield random.standard_normal(regression.n_rows)
 
 
-def known_noise(regression: TimeSeriesRegression, dof: float) -> Noise:
+def known_noise(regression: TimeSeriesRegression, dof: float) -> BandNoise:
     count = len(regression.bands)
     outputs = dict.fromkeys(regression.outputs, 1.0)
-    return Noise(np.ones(count), np.full(count, dof), outputs, from_repeats=True)
+    return BandNoise(np.ones(count), np.full(count, dof), outputs, from_repeats=True)
 
 
 class TestLackOfFit:

@@ -7,7 +7,7 @@ import pytest
 
 from ipanema3_poses import TABLE_2, figures, predicted
 from winchkit.catalog import find
-from winchkit.robot import Linear, Pose, Robot, approximate_forces, flat_pose, robot_of
+from winchkit.robot import LinearLaw, Pose, Robot, approximate_forces, flat_pose, robot_of
 from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 from winchkit.schema.read import read_robot
 
@@ -103,11 +103,11 @@ def test_eq_8_leaves_what_cables_can_bear() -> None:
 
 def test_k0_is_an_origin_that_cancels(robot: Robot) -> None:
     """As printed a cable under 500 N would be shorter by 2.5 % than one that nothing pulls."""
-    assert Linear(439.13e3, 11382.76).strain(500.0) < -0.02
+    assert LinearLaw(439.13e3, 11382.76).strain(500.0) < -0.02
     away = flat_pose(Pose(np.array([[0.55, -0.55, 1.8]]), np.eye(3)[None]))
     stretches = [
         ElongationCorrection(robot, [law] * 8, robot.home, np.full(8, 500.0)).update(away)
-        for law in (Linear(439.13e3, 11382.76), Linear(439.13e3))
+        for law in (LinearLaw(439.13e3, 11382.76), LinearLaw(439.13e3))
     ]
     np.testing.assert_allclose(stretches[0].length, stretches[1].length, rtol=1e-9, atol=1e-12)
     assert max(map(abs, stretches[0].length)) > 1e-3

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from winchkit.errors import UsageError
 from winchkit.model.friction import normal_force, stribeck, tension_after
-from winchkit.model.pulleys import Bearings, Eyelets, Presliding, eq27_tension, over_pulleys
+from winchkit.model.pulleys import Bearings, DahlPulleys, Eyelets, eq27_tension, over_pulleys
 from winchkit.sim.physics.presliding import relax
 
 WRAPS = (pi / 2, pi, pi / 3)
@@ -75,7 +75,7 @@ def test_the_stribeck_curve_between_its_ends() -> None:
 @pytest.mark.parametrize("direction", [1, -1])
 def test_after_presliding_a_pulley_slides(direction: int) -> None:
     towards = direction * np.linspace(0, 0.5, 400)
-    found = Presliding(0.03, 2000.0).over(300.0, WRAPS, towards)
+    found = DahlPulleys(0.03, 2000.0).over(300.0, WRAPS, towards)
     slid = over_pulleys(300.0, WRAPS, float(direction), Bearings(0.03))
     assert found[0] == 300.0
     assert found[-1] == pytest.approx(float(slid), rel=1e-9)
@@ -88,7 +88,7 @@ def test_presliding_from_the_cell_undoes_presliding_from_the_platform(shape: flo
     time = np.linspace(0, 12, 6001)
     wound_in = 0.02 * np.sin(time) + 0.004 * np.sin(5 * time)
     platform = 300 + 30 * np.cos(0.7 * time)
-    law = Presliding(0.02, 1500.0, shape)
+    law = DahlPulleys(0.02, 1500.0, shape)
     cell = law.over(platform, WRAPS[::-1], wound_in)
     assert np.ptp(cell - platform) > 20
     assert np.allclose(law.over(cell, WRAPS, -wound_in), platform, atol=0.02)
@@ -96,7 +96,7 @@ def test_presliding_from_the_cell_undoes_presliding_from_the_platform(shape: flo
 
 def test_presliding_is_the_simulators_integration() -> None:
     wound_in = 0.02 * np.sin(np.linspace(0, 12, 3000))
-    found = Presliding(0.04, 1500.0).over(300.0, (2.0,), wound_in)
+    found = DahlPulleys(0.04, 1500.0).over(300.0, (2.0,), wound_in)
     force, expected = 0.0, []
     for moved in np.diff(wound_in, prepend=wound_in[0]):
         normal = sqrt(300**2 - 2 * 300 * (300 + force) * cos(2.0) + (300 + force) ** 2)
@@ -173,13 +173,13 @@ def test_eq_27_and_the_exact_step_agree_from_a_fresh_start() -> None:
     """Eq. 26 and 27 hold from zero friction in one direction; losses small, one pulley."""
     friction, stiffness = 0.01, 2000.0
     towards = np.linspace(0, 0.03, 50)
-    platform = Presliding(friction, stiffness).over(400.0, (pi / 2,), towards)
+    platform = DahlPulleys(friction, stiffness).over(400.0, (pi / 2,), towards)
     loss = friction * 2 * sin(pi / 4)
     found = eq27_tension(platform, towards, (loss,), stiffness)
     assert np.allclose(found, 400.0, atol=0.05)
     # After a reversal the printed form no longer holds.
     back = np.concatenate([towards, towards[::-1]])
-    there = Presliding(friction, stiffness).over(400.0, (pi / 2,), back)
+    there = DahlPulleys(friction, stiffness).over(400.0, (pi / 2,), back)
     printed = eq27_tension(there, back, (loss,), stiffness)
     assert np.max(np.abs(printed - 400.0)) > 5
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from npm_install import install
-from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recover import recover
 
@@ -32,15 +32,17 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return install(tmp_path_factory.mktemp("npm"), *PACKAGES)
 
 
-def written(path: Path) -> Samples:
+def written(path: Path) -> SourceSamples:
     """A log of one drive in ten chunks; its samples."""
-    source = Source("/A/drive", (Signal("motor_angle", "rad"), Signal("motor_torque", "N m")), 0.1)
+    source = SignalSource(
+        "/A/drive", (SourceSignal("motor_angle", "rad"), SourceSignal("motor_torque", "N m")), 0.1
+    )
     times = np.arange(COUNT) / 250
     torque = np.where(times < 0.5, np.nan, np.cos(times))
-    samples = Samples(times, times + 1e-3, np.column_stack([np.sin(times), torque]))
+    samples = SourceSamples(times, times + 1e-3, np.column_stack([np.sin(times), torque]))
     log = open_log(path, Layout((source,), RowRule("/A/drive", 0.0), UTC), {"load_mass": "15 kg"})
     for part in np.array_split(np.arange(COUNT), 10):
-        piece = Samples(times[part], samples.received[part], samples.values[part])
+        piece = SourceSamples(times[part], samples.received[part], samples.values[part])
         log.write({"/A/drive": piece}, float(times[part[-1]]))
     log.add_event(times[-1], {"tripped": ["winch A: tension above 800 N"]})
     log.close({})

@@ -176,3 +176,13 @@ def test_the_page_of_public_names_is_up_to_date() -> None:
     assert sorted(fleets) == sorted(winchkit.fleet.__all__)
     there = (ROOT / "docs/api.md").read_text(encoding="utf-8")
     assert there == PAGE["page"](), "run: python docs/make_api.py"
+
+
+def test_a_name_of_a_class_stands_for_one_class() -> None:
+    """``sim`` included, though it is a second implementation: a reader meets both."""
+    places: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "winchkit").rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(path.relative_to(ROOT).as_posix())
+    assert not {name: found for name, found in places.items() if len(found) > 1}

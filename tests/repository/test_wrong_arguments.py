@@ -67,7 +67,7 @@ def valid(winch_run: winchkit.Run, tmp_path_factory: pytest.TempPathFactory) -> 
         "RobotProfile": robot,
         "Robot": winchkit.robot.robot_of(robot),
         "SimBench": winchkit.read_simbench(winchkit.find("sim", "demo-elastic-rope")),
-        "Measured": read_poses([winchkit.read_run(poses)], robot),
+        "MeasuredPoses": read_poses([winchkit.read_run(poses)], robot),
         "str | Path": poses.parent / "absent.py",
         "Sequence[str | Path]": [winch_run.path],
         "Sequence[str]": [winch_run.path],

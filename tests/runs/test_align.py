@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.runs.align import Aligner, Series, values_at
-from winchkit.runs.layout import Layout, RowRule, Signal, Source
+from winchkit.runs.align import Aligner, SourceSeries, values_at
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSignal
 
 STEPS = st.lists(st.floats(1e-3, 0.2), min_size=2, max_size=40)
 SHARES = st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=30)
@@ -32,7 +32,7 @@ def test_values_are_numpys_between_near_neighbours_and_nan_elsewhere(
 
 
 def test_no_value_without_neighbours() -> None:
-    series = Series(max_gap=0.1)
+    series = SourceSeries(max_gap=0.1)
 
     def at(moment: float) -> float:
         return float(series.at(np.array([moment]))[0, 0])
@@ -55,15 +55,17 @@ def test_no_value_without_neighbours() -> None:
 
 
 def layout(period: float = 0.0, opened: float = 0.0) -> Layout:
-    drive = Source(
+    drive = SignalSource(
         "/A/drive",
         (
-            Signal("motor_angle", "rad", "motor_angle"),
-            Signal("motor_torque", "N m", "motor_torque"),
+            SourceSignal("motor_angle", "rad", "motor_angle"),
+            SourceSignal("motor_torque", "N m", "motor_torque"),
         ),
         0.1,
     )
-    cell = Source("/A/cell", (Signal("raw", "1"), Signal("tension", "N", "tension")), 0.1)
+    cell = SignalSource(
+        "/A/cell", (SourceSignal("raw", "1"), SourceSignal("tension", "N", "tension")), 0.1
+    )
     base = "/A/drive" if period else "/A/cell"
     return Layout((drive, cell), RowRule(base, opened, period))
 
@@ -177,7 +179,9 @@ def test_readings_out_of_order_make_no_rows() -> None:
 
 
 def test_the_end_of_a_log_waits_for_nothing_slower_than_its_rows() -> None:
-    slow = Source("/A/temperature", (Signal("temperature", "degC", "temperature"),), 1.0)
+    slow = SignalSource(
+        "/A/temperature", (SourceSignal("temperature", "degC", "temperature"),), 1.0
+    )
     made = layout()
     aligner = Aligner(Layout((*made.sources, slow), made.rule))
     aligner.add("/A/drive", *samples(250, 0.0))
@@ -197,7 +201,7 @@ def test_the_end_of_a_log_waits_for_nothing_slower_than_its_rows() -> None:
 
 def test_the_end_of_a_log_keeps_the_rows_of_a_source_that_fell_silent_before_it() -> None:
     """An instrument that gave no reading in the last 0.2 s does not cost the others their rows."""
-    length = Source("/A/length", (Signal("length", "m", "cable_length"),), 0.1)
+    length = SignalSource("/A/length", (SourceSignal("length", "m", "cable_length"),), 0.1)
     made = layout()
     aligner = Aligner(Layout((*made.sources, length), made.rule))
     aligner.add("/A/drive", *samples(250, 0.0))

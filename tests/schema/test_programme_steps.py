@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from winchkit.errors import FileError
-from winchkit.schema.programme import Programme, Step, write_programme
+from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
 from winchkit.schema.read import read_programme
 
 
-def move(to: float | None = None, by: float | None = None, winch: str = "all") -> Step:
-    return Step(to=to, by=by, speed=0.2, winch=winch)
+def move(to: float | None = None, by: float | None = None, winch: str = "all") -> ProgrammeStep:
+    return ProgrammeStep(to=to, by=by, speed=0.2, winch=winch)
 
 
 @pytest.mark.parametrize(
@@ -20,25 +20,25 @@ def move(to: float | None = None, by: float | None = None, winch: str = "all") -
     [
         ([move(1.0), move(3.0)], (2.9, 3.0)),
         ([move(3.0), move(2.95)], (3.0, 2.95)),
-        ([move(2.0), move(by=-0.5), Step(hold=1.0)], (1.6, 1.5)),
+        ([move(2.0), move(by=-0.5), ProgrammeStep(hold=1.0)], (1.6, 1.5)),
         ([move(2.0), move(2.0)], (2.0,)),
         ([move(by=-0.5), move(by=0.5)], ()),
         ([move(by=-0.5), move(3.0)], (3.0,)),
         ([move(1.0), move(4.0, winch="B")], (1.0,)),
-        ([Step(hold=1.0)], ()),
+        ([ProgrammeStep(hold=1.0)], ()),
     ],
 )
 def test_it_begins_where_it_ends_and_comes_from_the_same_side(
-    steps: list[Step], way: tuple[float, ...]
+    steps: list[ProgrammeStep], way: tuple[float, ...]
 ) -> None:
     assert Programme("p", tuple(steps)).approach("A") == pytest.approx(way)
 
 
 def test_a_question_is_asked_once_while_it_stays_true() -> None:
-    load = Step(ask="hang it", load_mass=10.0)
-    warm = Step(ask="warm it", temperature=35.0)
-    both = Step(ask="both", load_mass=10.0, temperature=35.0)
-    other = Step(ask="grease the drum")
+    load = ProgrammeStep(ask="hang it", load_mass=10.0)
+    warm = ProgrammeStep(ask="warm it", temperature=35.0)
+    both = ProgrammeStep(ask="both", load_mass=10.0, temperature=35.0)
+    other = ProgrammeStep(ask="grease the drum")
     assert load.asks_beyond(None, None)
     assert not load.asks_beyond(10.0, None)
     assert warm.asks_beyond(10.0, 20.0)
@@ -51,7 +51,7 @@ def test_a_question_is_asked_once_while_it_stays_true() -> None:
 
 def test_a_temperature_is_written_and_read_and_belongs_to_a_question(tmp_path: Path) -> None:
     path = tmp_path / "warm.toml"
-    programme = Programme("warm", (Step(ask="warm it", temperature=35.0), move(1.0)))
+    programme = Programme("warm", (ProgrammeStep(ask="warm it", temperature=35.0), move(1.0)))
     write_programme(programme, path)
     assert 'temperature = "35 degC"' in path.read_text(encoding="utf-8")
     assert read_programme(path).step[0].temperature == 35.0

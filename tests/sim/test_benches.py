@@ -55,7 +55,7 @@ def test_answers_stand_in_the_catalogue(name: str) -> None:
 
 
 def test_every_other_file_of_the_folder_is_a_programme() -> None:
-    assert [row["name"] for row in listed_benches()] == BENCHES
+    assert [row.name for row in listed_benches()] == BENCHES
     others = [name for name in names("sim") if name not in BENCHES]
     assert others == ["programme-demo", "programme-demo-fast", "programme-demo-slow"]
     assert load(find("sim", others[0])).kind == "programme"

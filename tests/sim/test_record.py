@@ -13,17 +13,21 @@ from winchkit.cli.sim.group import command
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec, LimitSpec
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
 from winchkit.sim.record import simulate
 from winchkit.sim.schedule import ASK_PAUSE, schedule
 
 LIMITS = {"A": LimitSpec(speed=0.5, acceleration=1.0, length=(0.5, 5.0))}
-UP_AND_DOWN = (Step(to=3.0, speed=0.5), Step(hold=0.2), Step(to=3.6, speed=0.5))
+UP_AND_DOWN = (
+    ProgrammeStep(to=3.0, speed=0.5),
+    ProgrammeStep(hold=0.2),
+    ProgrammeStep(to=3.6, speed=0.5),
+)
 TWO_LOADS = (
-    Step(ask="hang", load_mass=10.0),
+    ProgrammeStep(ask="hang", load_mass=10.0),
     *UP_AND_DOWN,
-    Step(ask="hang", load_mass=20.0),
+    ProgrammeStep(ask="hang", load_mass=20.0),
     *UP_AND_DOWN,
 )
 
@@ -32,8 +36,12 @@ def plans(motion: Programme, start: float = 4.0) -> list:
     return schedule(motion, LIMITS, {"A": start}, {"A": 10.0})
 
 
-@pytest.mark.parametrize("steps", [(Step(to=2.0),), (Step(by=0.0),), (Step(ask="hang"),)])
-def test_a_programme_that_leaves_nothing_to_record_is_reported(steps: tuple[Step, ...]) -> None:
+@pytest.mark.parametrize(
+    "steps", [(ProgrammeStep(to=2.0),), (ProgrammeStep(by=0.0),), (ProgrammeStep(ask="hang"),)]
+)
+def test_a_programme_that_leaves_nothing_to_record_is_reported(
+    steps: tuple[ProgrammeStep, ...],
+) -> None:
     """Its repeats end where they start: without the error no file would be written."""
     with pytest.raises(FileError, match="neither a move nor a hold"):
         plans(programme(*steps, repeat=2))
@@ -48,30 +56,30 @@ def test_every_load_and_repeat_is_a_run() -> None:
 
 
 def test_relative_moves_start_where_the_winch_stands() -> None:
-    (only,) = plans(programme(Step(by=-0.5, speed=0.3), Step(by=0.2, speed=0.3)))
+    (only,) = plans(programme(ProgrammeStep(by=-0.5, speed=0.3), ProgrammeStep(by=0.2, speed=0.3)))
     assert only.start["A"] == 4.0
     assert sum(leg.moves["A"].distance for leg in only.legs) == pytest.approx(-0.3)
 
 
 def test_speed_is_limited_by_the_bench() -> None:
-    (only,) = plans(programme(Step(by=-2.0, speed=9.0, acceleration=9.0)))
+    (only,) = plans(programme(ProgrammeStep(by=-2.0, speed=9.0, acceleration=9.0)))
     move = only.legs[0].moves["A"]
     assert abs(move.at(move.duration / 2)[1]) == pytest.approx(0.5)
 
 
 def test_a_move_to_where_it_stands_takes_no_time() -> None:
-    (found,) = plans(programme(Step(to=4.0, speed=0.1), Step(hold=0.5)))
+    (found,) = plans(programme(ProgrammeStep(to=4.0, speed=0.1), ProgrammeStep(hold=0.5)))
     assert found.duration == 0.5
 
 
 @pytest.mark.parametrize(
     ("step", "message"),
     [
-        (Step(winch="B", to=3.0, speed=0.1), r"no winch 'B'.*it has A"),
-        (Step(to=9.0, speed=0.1), r"would be at 9 m, outside its limits 0.5 m to 5 m"),
+        (ProgrammeStep(winch="B", to=3.0, speed=0.1), r"no winch 'B'.*it has A"),
+        (ProgrammeStep(to=9.0, speed=0.1), r"would be at 9 m, outside its limits 0.5 m to 5 m"),
     ],
 )
-def test_steps_that_do_not_fit(step: Step, message: str) -> None:
+def test_steps_that_do_not_fit(step: ProgrammeStep, message: str) -> None:
     with pytest.raises(FileError, match=message):
         plans(programme(step))
 
@@ -120,7 +128,9 @@ def test_two_winches_share_a_file() -> None:
     single = bench()
     wiring = {"A": single.bench.winch["A"], "B": single.bench.winch["A"]}
     pair = SimBench("pair", BenchSpec("pair", wiring, {}), dict.fromkeys("AB", single.truth["A"]))
-    motion = programme(Step(winch="B", to=3.5, speed=0.5), Step(to=3.8, speed=0.2))
+    motion = programme(
+        ProgrammeStep(winch="B", to=3.5, speed=0.5), ProgrammeStep(to=3.8, speed=0.2)
+    )
     (run,) = simulate(pair, {"A": GROOVED, "B": GROOVED}, motion)
     assert run.winches() == ["A", "B"]
     a, b = run.of_winch("A")["cable_length"], run.of_winch("B")["cable_length"]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
 from winchkit.bench.recording.recorder import Recorder
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import FileError
 from winchkit.runs.recording.rotation import Rotation
 
@@ -101,7 +101,7 @@ class Fed:
 
 
 def give(cell: Cell, value: float, now: float, quality: Quality = Quality.GOOD) -> None:
-    reading = Reading(
+    reading = InstrumentReading(
         value=value,
         gross=value + 1,
         raw=value if math.isnan(value) else round(value * 10),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation
 
@@ -15,17 +15,21 @@ OPENED = 1000.0
 DRIVE, CELL = "/A/drive", "/A/cell"
 LAYOUT = Layout(
     (
-        Source(
+        SignalSource(
             DRIVE,
             (
-                Signal("motor_angle", "rad", "motor_angle"),
-                Signal("motor_torque", "N m", "motor_torque"),
+                SourceSignal("motor_angle", "rad", "motor_angle"),
+                SourceSignal("motor_torque", "N m", "motor_torque"),
             ),
             0.1,
         ),
-        Source(
+        SignalSource(
             CELL,
-            (Signal("tension", "N", "tension"), Signal("raw", "1"), Signal("quality", "1")),
+            (
+                SourceSignal("tension", "N", "tension"),
+                SourceSignal("raw", "1"),
+                SourceSignal("quality", "1"),
+            ),
             0.1,
         ),
     ),
@@ -35,7 +39,7 @@ LAYOUT = Layout(
 METADATA = {"load_mass": "15 kg", "note": "two\nlines"}
 
 
-def samples_until(end: float) -> dict[str, Samples]:
+def samples_until(end: float) -> dict[str, SourceSamples]:
     """What comes from ``OPENED`` on until a moment."""
     drive, cell = (
         np.arange(OPENED + delay, end, step) for delay, step in ((0, 4e-3), (7e-3, 0.02))
@@ -43,8 +47,8 @@ def samples_until(end: float) -> dict[str, Samples]:
     quality = np.where(np.arange(len(cell)) % 7 == 3, 2.0, 0.0)
     torque = np.where(drive < OPENED + 0.3, np.nan, np.cos(drive))
     return {
-        DRIVE: Samples(drive, drive, np.column_stack([np.sin(drive), torque])),
-        CELL: Samples(
+        DRIVE: SourceSamples(drive, drive, np.column_stack([np.sin(drive), torque])),
+        CELL: SourceSamples(
             cell,
             cell + 5e-3,
             np.column_stack([100 + np.cos(cell), np.arange(float(len(cell))), quality]),
@@ -52,12 +56,12 @@ def samples_until(end: float) -> dict[str, Samples]:
     }
 
 
-def between(pieces: dict[str, Samples], begin: float, end: float) -> dict[str, Samples]:
+def between(pieces: dict[str, SourceSamples], begin: float, end: float) -> dict[str, SourceSamples]:
     """What arrives in a stretch of time."""
     found = {}
     for topic, item in pieces.items():
         part = (item.received >= begin) & (item.received < end)
-        found[topic] = Samples(item.times[part], item.received[part], item.values[part])
+        found[topic] = SourceSamples(item.times[part], item.received[part], item.values[part])
     return found
 
 

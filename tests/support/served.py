@@ -13,7 +13,7 @@ from winchkit import catalog
 from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
-from winchkit.sim.instruments.modbus_line import ModbusLine
+from winchkit.sim.instruments.modbus_line import SimulatedModbusLine
 
 BENCH = """\
 schema = 1
@@ -56,7 +56,7 @@ class Served:
         # Switched on before anybody asks: its first conversion is through its filter.
         on = time.monotonic() - 1.0
         self.cell = ModbusInstrument(spec, in_unit_of(spec, self._measure), now=on)
-        self.line = ModbusLine({1: self.cell}, self._up_to_date, serial=serial)
+        self.line = SimulatedModbusLine({1: self.cell}, self._up_to_date, serial=serial)
 
     def __enter__(self) -> Served:
         self.line.start()

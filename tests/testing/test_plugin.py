@@ -12,14 +12,14 @@ import pytest
 
 from winchkit.errors import FileError, LimitTripped, UsageError
 from winchkit.testing.opened import OpenedBench
-from winchkit.testing.plugin import SimBench
+from winchkit.testing.plugin import SimBenchFixture
 
 ROOT = Path(__file__).parents[2]
 WEIGHT = 10 * 9.80665
 
 
 @pytest.fixture
-def sim(sim_bench: SimBench) -> OpenedBench:
+def sim(sim_bench: SimBenchFixture) -> OpenedBench:
     return sim_bench("spiral-bench")
 
 
@@ -43,7 +43,7 @@ def test_what_is_not_true_is_reported_with_what_is(sim: OpenedBench) -> None:
         sim.assert_tension("A", WEIGHT, within=0.05, lasting=0.0, tolerance=-1.0)
 
 
-def test_winches_declared_in_the_test(sim_bench: SimBench) -> None:
+def test_winches_declared_in_the_test(sim_bench: SimBenchFixture) -> None:
     sim = sim_bench(
         winches={
             "left": {"profile": "bench-grooved", "truth": {"load_mass": "5 kg"}},
@@ -62,7 +62,7 @@ def test_winches_declared_in_the_test(sim_bench: SimBench) -> None:
     assert sim.length("right") > 4.01
 
 
-def test_declarations_with_faults_are_refused_like_files(sim_bench: SimBench) -> None:
+def test_declarations_with_faults_are_refused_like_files(sim_bench: SimBenchFixture) -> None:
     with pytest.raises(FileError, match=r"sim-bench.toml:\d+: winch.A.limits.sped"):
         sim_bench(winches={"A": {"limits": {"sped": "1 m/s"}}})
     with pytest.raises(FileError, match="did you mean 'spiral-bench'"):
@@ -73,7 +73,7 @@ def test_declarations_with_faults_are_refused_like_files(sim_bench: SimBench) ->
         sim_bench("spiral-bench", hidden=["elastick rope"])
 
 
-def test_two_benches_do_not_receive_each_other(sim_bench: SimBench) -> None:
+def test_two_benches_do_not_receive_each_other(sim_bench: SimBenchFixture) -> None:
     first, second = sim_bench("spiral-bench"), sim_bench("spiral-bench")
     first.bench.winch["A"].jog(wind_in=0.1, duration=0.3)
     second.assert_moved("A", 0.0, 1e-6)
@@ -202,14 +202,14 @@ def test_what_a_callback_raises_comes_out_of_close(sim: OpenedBench) -> None:
     sim.close()
 
 
-def test_a_function_that_still_steers_does_not_keep_it_open(sim_bench: SimBench) -> None:
+def test_a_function_that_still_steers_does_not_keep_it_open(sim_bench: SimBenchFixture) -> None:
     sim = sim_bench("spiral-bench")
     sim.bench.on_cycle(lambda _snapshot: {"A": -0.1})
     sim.assert_state("A", "operation enabled")
     sim.close()
 
 
-def test_nothing_is_left_running(sim_bench: SimBench) -> None:
+def test_nothing_is_left_running(sim_bench: SimBenchFixture) -> None:
     before = set(threading.enumerate())
     sim = sim_bench("spiral-bench")
     assert set(threading.enumerate()) > before

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.errors import UsageError
 from winchkit.schema.read import read_device
-from winchkit.sim.live.buses import Carried, Wire
+from winchkit.sim.live.buses import BusWire, Carried
 from winchkit.testing.frames import FrameNames
 
 HOST, NODE = 127, 3
@@ -30,12 +30,12 @@ def time() -> Time:
     return Time()
 
 
-def drained(wire: Wire, *, from_drive: bool) -> list[int]:
+def drained(wire: BusWire, *, from_drive: bool) -> list[int]:
     return [frame[0] for frame in iter(lambda: wire.due(from_drive=from_drive), None)]
 
 
 def test_an_undisturbed_wire_carries_everything_at_once(time: Time) -> None:
-    wire, heard = Wire(time), []
+    wire, heard = BusWire(time), []
     wire.taps.append(heard.append)
     assert wire.carry(0x181, b"ab", from_drive=True)
     assert wire.carry(0x201, b"", from_drive=False)
@@ -47,7 +47,7 @@ def test_an_undisturbed_wire_carries_everything_at_once(time: Time) -> None:
 
 
 def test_what_is_dropped_is_reported_as_lost_and_only_while_it_lasts(time: Time) -> None:
-    wire, heard = Wire(time), []
+    wire, heard = BusWire(time), []
     wire.taps.append(heard.append)
     end = wire.disturb({0x181})
     assert not wire.carry(0x181, b"", from_drive=True)
@@ -59,7 +59,7 @@ def test_what_is_dropped_is_reported_as_lost_and_only_while_it_lasts(time: Time)
 
 
 def test_what_is_delayed_comes_in_order_of_its_new_time_each_way(time: Time) -> None:
-    wire = Wire(time)
+    wire = BusWire(time)
     wire.disturb({1}, delay=0.03)
     wire.disturb({2}, delay=0.01)
     assert not wire.carry(1, b"", from_drive=True)
@@ -75,7 +75,7 @@ def test_what_is_delayed_comes_in_order_of_its_new_time_each_way(time: Time) -> 
 
 def test_a_share_is_about_that_share_and_the_same_for_a_seed(time: Time) -> None:
     def fates(seed: int) -> list[bool]:
-        wire = Wire(time, seed=seed)
+        wire = BusWire(time, seed=seed)
         wire.disturb(range(0x800), share=0.3)
         return [wire.carry(5, b"", from_drive=True) for _ in range(2000)]
 
@@ -88,7 +88,7 @@ def test_a_share_is_about_that_share_and_the_same_for_a_seed(time: Time) -> None
 @pytest.mark.parametrize("options", [{"share": 0.0}, {"share": 1.1}, {"delay": -1.0}])
 def test_what_no_wire_does_is_refused(time: Time, options: dict[str, float]) -> None:
     with pytest.raises(UsageError, match="share is above 0"):
-        Wire(time).disturb({1}, **options)  # type: ignore[arg-type]
+        BusWire(time).disturb({1}, **options)  # type: ignore[arg-type]
 
 
 def names() -> FrameNames:

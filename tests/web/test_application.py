@@ -34,7 +34,7 @@ from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.state import Judgement
 from winchkit.web.views import views_of
-from winchkit.web.workspace import INTERNAL, Workspace
+from winchkit.web.workspace import INTERNAL, DiagnoseView
 
 TOKEN = "t0ken"
 HEADERS = {"x-winchkit-token": TOKEN}
@@ -52,7 +52,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def client(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    workspace = Workspace(tmp_path_factory.mktemp("page"))
+    workspace = DiagnoseView(tmp_path_factory.mktemp("page"))
     app = application(workspace, TOKEN, views_of(workspace, recorded))
     with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
         opened.workspace = workspace  # type: ignore[attr-defined]
@@ -267,7 +267,7 @@ def _both_sides_have_one_axis(client: TestClient, before: dict[str, float], afte
     assert settled(client)["beside"] is None
 
 
-def _is_that_of_the_command_line(workspace: Workspace, effect: str, path: Path) -> None:
+def _is_that_of_the_command_line(workspace: DiagnoseView, effect: str, path: Path) -> None:
     """The refitted profile of the page, and its errors, are those of ``add`` and ``diagnose``."""
     earlier, present = (version.path for version in workspace.state.versions)
     runs = [item.run for item in workspace.state.runs]
@@ -369,7 +369,7 @@ def test_verdicts_are_those_of_the_page_and_of_the_tables(recorded: Path, tmp_pa
 
 @pytest.mark.slow
 def test_a_cancelled_addition_leaves_the_profile_as_it_was(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
+    workspace = DiagnoseView(tmp_path)
     workspace.example("demo-fat-drum").result(PATIENCE)
     before = workspace.view()
     effect = next(r["effect"] for r in before["diagnosis"]["ladder"]["rows"] if "effect" in r)
@@ -383,7 +383,7 @@ def test_a_cancelled_addition_leaves_the_profile_as_it_was(tmp_path: Path) -> No
 
 
 def test_an_unexpected_error_of_a_task_is_shown_and_not_lost(tmp_path: Path) -> None:
-    workspace = Workspace(tmp_path)
+    workspace = DiagnoseView(tmp_path)
     workspace.task("calibrating", [].pop).result(60.0)
     view = workspace.view()
     assert view["busy"] is None
@@ -396,7 +396,7 @@ def test_long_runs_are_drawn_before_they_are_compared(
 ) -> None:
     monkeypatch.setattr("winchkit.web.workspace._LONG", 1000)
     seen: list[tuple[bool, list[str], bool]] = []
-    workspace = Workspace(tmp_path)
+    workspace = DiagnoseView(tmp_path)
 
     def note() -> None:
         view = workspace.view()

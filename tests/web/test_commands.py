@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from winchkit.cli import main
 from winchkit.runs.read import read_run
 from winchkit.web.examples import example_runs
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 PATIENCE = 300.0
 DRAWING = {
@@ -52,7 +52,7 @@ def test_the_commands_of_the_page_repeat_its_work(
     logs = logged(tmp_path / "logger")
     monkeypatch.chdir(tmp_path / "work")
     server = tmp_path / "server"
-    page = Workspace(server, work=Path())
+    page = DiagnoseView(server, work=Path())
     page.new_profile("my winch", DRAWING, PULLEYS)
     for log in logs:
         kept = page.keep(log.name, log.read_bytes()).resolve()

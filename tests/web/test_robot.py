@@ -19,7 +19,7 @@ from robot_poses.truth import Truth, csv, poses
 from winchkit.schema.read import read_robot
 from winchkit.web.application import application
 from winchkit.web.views import views_of
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 TOKEN = "t0ken"
 HEADERS = {"x-winchkit-token": TOKEN}
@@ -29,7 +29,7 @@ LIMITS = "low=20&high=150"
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     folder = tmp_path_factory.mktemp("page")
-    workspace = Workspace(folder)
+    workspace = DiagnoseView(folder)
     app = application(workspace, TOKEN, views_of(workspace, folder))
     with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
         opened.workspace = workspace  # type: ignore[attr-defined]

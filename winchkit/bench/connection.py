@@ -25,14 +25,14 @@ from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
-from winchkit.drivers.can.tools.scan import Found, named_after, scan
+from winchkit.drivers.can.tools.scan import ScannedNode, named_after, scan
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
-    from winchkit.bench.tracker import Tracker
+    from winchkit.bench.tracker import TrackerReceiver
 
 _WATCHED = 2.0
 """Frames are collected for so long after somebody asked for them, s."""
@@ -61,7 +61,7 @@ class BenchConnection(ABC):
         self.spec = spec
         self.clock = clock
         self._recorders: list[Recorder] = []
-        self._tracker: Tracker | None = None
+        self._tracker: TrackerReceiver | None = None
         self._tracker_lock = threading.Lock()
         with ExitStack() as stack:
             stack.callback(ownership.close)
@@ -109,7 +109,7 @@ class BenchConnection(ABC):
             self._tracker.close()
 
     @property
-    def tracker(self) -> Tracker | None:
+    def tracker(self) -> TrackerReceiver | None:
         """The tracker of its robot, received from the first use on; None where none is declared.
 
         Raises ConnectionLost where its address is in use.
@@ -117,11 +117,11 @@ class BenchConnection(ABC):
         wiring = None if self.spec.robot is None else self.spec.robot.tracker
         if wiring is None:
             return None
-        from winchkit.bench.tracker import Tracker
+        from winchkit.bench.tracker import TrackerReceiver
 
         with self._tracker_lock:
             if self._tracker is None:
-                self._tracker = Tracker(self.clock.now)
+                self._tracker = TrackerReceiver(self.clock.now)
                 if isinstance(self.clock, Scheduler):
                     self.clock.receive_datagrams(wiring.listen, self._tracker.receive)
                 else:
@@ -197,7 +197,7 @@ class BenchConnection(ABC):
 
         return remove
 
-    def scan(self) -> list[Found]:
+    def scan(self) -> list[ScannedNode]:
         """Who is on the CAN buses; reads only. Raises ConnectionLost."""
         wiring = {name: one.servo for name, one in self.spec.winch.items()}
         found = []

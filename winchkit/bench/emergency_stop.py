@@ -11,7 +11,7 @@ from winchkit.arguments import require_type
 from winchkit.bench.ownership import mark_stop
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
-from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, DriveState, state_of
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec, WinchWiring
@@ -27,7 +27,11 @@ _POLL = 0.02
 """s: each look is two SDO requests (2 ms at 1 Mbit/s) per drive."""
 _INSIST = 0.2
 """For drives that have not taken the first command, s: ten further ones."""
-_MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+_MOVING = (
+    DriveState.OPERATION_ENABLED,
+    DriveState.QUICK_STOP_ACTIVE,
+    DriveState.FAULT_REACTION_ACTIVE,
+)
 
 
 @dataclass(frozen=True)
@@ -153,18 +157,18 @@ def _confirm(
     from winchkit.drivers.can.cia402.standstill import PolledStandstill
 
     deadline = clock.now() + _STOP_TIME
-    state = State.UNKNOWN
+    state = DriveState.UNKNOWN
     standstill: PolledStandstill | None = None
     while clock.now() < deadline:
         try:
             state = state_of(node.read(0x6041))
             standstill = standstill or PolledStandstill(node, servo, clock)
-            at_rest = standstill.poll() and state is State.QUICK_STOP_ACTIVE
+            at_rest = standstill.poll() and state is DriveState.QUICK_STOP_ACTIVE
         except ConnectionLost as error:
             return Stopped(winch, False, str(problem or error))
-        if at_rest or (state not in _MOVING and state is not State.UNKNOWN):
+        if at_rest or (state not in _MOVING and state is not DriveState.UNKNOWN):
             return Stopped(winch, True, f"{state}, at rest" if at_rest else str(state))
-        if state is State.OPERATION_ENABLED:
+        if state is DriveState.OPERATION_ENABLED:
             _tell(node)
         clock.sleep(_POLL)
     return Stopped(winch, False, f"still {state} after {_STOP_TIME:g} s")

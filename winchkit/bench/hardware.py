@@ -15,7 +15,7 @@ from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
-from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
+from winchkit.bench.control.frozen_cell import FrozenCell, PredictedTension
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
@@ -205,7 +205,7 @@ def _winches(
             Controller(axes[name], cables[name], winch.limits),
             sensors[name],
             _frozen_cell(spec, winch),
-            HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
+            PredictedTension(math.nan if winch.load_mass is None else winch.load_mass),
             cable_spec=profiles[name].cable,
             capacity=_capacity(profiles[name]),
         )

@@ -10,7 +10,7 @@ from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction
 from winchkit.bench.remote.commander import Commanders
-from winchkit.bench.tracker import Tracker
+from winchkit.bench.tracker import TrackerReceiver
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
 
@@ -26,7 +26,7 @@ class WinchHost(Protocol):
     cells: CellDesk
 
     @property
-    def tracker(self) -> Tracker | None:
+    def tracker(self) -> TrackerReceiver | None:
         """The tracker of its robot; None where none is declared."""
 
     @property

@@ -13,7 +13,7 @@ from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import Direction, Phase
 from winchkit.bench.hardware import Wired
 from winchkit.drivers.can.cia402.axis import Cia402Axis
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import LimitTripped, MotionError, NoReply, NotPermitted, WinchkitError
@@ -146,7 +146,7 @@ _UNHEARD = (
 
 
 @dataclass(frozen=True)
-class _Found:
+class _ResetFindings:
     """What a reset finds, before it waits for anything."""
 
     unheard: frozenset[str]
@@ -159,7 +159,7 @@ class _Found:
     """Whether the host sends no heartbeat."""
 
 
-_SET_UP_ANEW: Mapping[str, Callable[[_Found, str], bool]] = {
+_SET_UP_ANEW: Mapping[str, Callable[[_ResetFindings, str], bool]] = {
     "it was not heard": lambda found, name: name in found.unheard,
     "the bench was not heard, and it has lost its set-up": lambda found, name: (
         "" in found.unheard and name in found.lost
@@ -190,7 +190,7 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
         # What somebody else commands during the reset keeps it from succeeding.
         axis.forget_second_master()
         axis.forget_position_jump()
-    found = _Found(
+    found = _ResetFindings(
         unheard=frozenset(t.winch for t in (*seen.tripped, *seen.blocked) if t.kind in _UNHEARD),
         lost=frozenset(name for name, axis in axes.items() if axis.lost_set_up),
         reopened=_on_reopened(wired, spec),
@@ -214,7 +214,9 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
             "ended; look at the drives, then reset again"
         )
     _set_up(lost, wired, clock)
-    faults = {name: axis.fault_text for name, axis in axes.items() if axis.state is State.FAULT}
+    faults = {
+        name: axis.fault_text for name, axis in axes.items() if axis.state is DriveState.FAULT
+    }
     reported = {trip.winch for trip in seen.tripped if trip.kind == "fault"}
     cleared += [
         f"winch {name}: drive fault: {faults[name]}" for name in faults if name not in reported

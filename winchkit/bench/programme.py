@@ -11,11 +11,11 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.winch import Winch
 from winchkit.errors import RunError, UsageError
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 
-Ask = Callable[[Step], None]
+Ask = Callable[[ProgrammeStep], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
-Progress = Callable[[int, int, Step], None]
+Progress = Callable[[int, int, ProgrammeStep], None]
 """Called with the repeat, the step's number and the step before it is executed."""
 
 _LEAD = 0.1
@@ -102,12 +102,12 @@ def earlier_runs(programme: Programme, folder: str | Path, suffix: str = ".csv")
     return sorted(found)
 
 
-def _parts(steps: list[tuple[int, Step]]) -> list[list[tuple[int, Step]]]:
+def _parts(steps: list[tuple[int, ProgrammeStep]]) -> list[list[tuple[int, ProgrammeStep]]]:
     """Steps cut where a question follows a motion: a question begins a new run.
 
     One about the load and the temperature that were asked for last is none, and is left out.
     """
-    parts: list[list[tuple[int, Step]]] = []
+    parts: list[list[tuple[int, ProgrammeStep]]] = []
     hanging: float | None = None
     warm: float | None = None
     for number, step in steps:
@@ -148,7 +148,7 @@ class _Execution:
         self._hanging = None if asks else _declared_load(bench)
         self._warm: float | None = None
 
-    def run(self, repeat: int, part: list[tuple[int, Step]], progress: Progress) -> None:
+    def run(self, repeat: int, part: list[tuple[int, ProgrammeStep]], progress: Progress) -> None:
         """Ask what there is to ask, then log the motions."""
         for number, step in part:
             if step.ask is None:
@@ -157,7 +157,7 @@ class _Execution:
             self.execute(repeat, step)
         self.end_run()
 
-    def execute(self, repeat: int, step: Step) -> None:
+    def execute(self, repeat: int, step: ProgrammeStep) -> None:
         """One step; a motion starts the log of its run where none is open."""
         if step.ask is not None:
             self._question(step)
@@ -187,7 +187,7 @@ class _Execution:
             recorder.close()
             self.written.append(recorder.path)
 
-    def _question(self, step: Step) -> None:
+    def _question(self, step: ProgrammeStep) -> None:
         if not step.asks_beyond(self._hanging, self._warm):
             return
         self.end_run()
@@ -248,14 +248,14 @@ class _Execution:
             self._require_going()
             clock.sleep(min(0.02, left))
 
-    def _move(self, step: Step) -> None:
+    def _move(self, step: ProgrammeStep) -> None:
         """Move one winch or, started in one cycle and lasting equally long, all of them."""
         chosen = self._winches(step.winch)
         lengths = {name: self._target(step, winch) for name, winch in chosen.items()}
         self._require_going()
         self._bench.move_together(lengths, step.speed, step.acceleration, hold=True)
 
-    def _target(self, step: Step, winch: Winch) -> float:
+    def _target(self, step: ProgrammeStep, winch: Winch) -> float:
         length = winch.cable_length + step.by if step.by is not None else step.to
         if length is None:
             raise UsageError(f"a step of '{self._programme.name}' has nothing to do")

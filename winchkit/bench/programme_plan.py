@@ -13,7 +13,7 @@ from winchkit.bench.control.motion import within_limits
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.model.trajectory import JERK_TIME, plan
 from winchkit.schema.bench import LimitSpec
-from winchkit.schema.programme import ALL, Programme, Step
+from winchkit.schema.programme import ALL, Programme, ProgrammeStep
 
 _SAMPLES = 24
 """Of a move."""
@@ -79,7 +79,7 @@ class _Moved:
 
 
 def _leg(
-    step: Step, limits: Mapping[str, LimitSpec], here: Mapping[str, float]
+    step: ProgrammeStep, limits: Mapping[str, LimitSpec], here: Mapping[str, float]
 ) -> tuple[float, _Moved]:
     """Duration and samples of a step; shorter moves last as long as the longest."""
     if step.hold is not None:

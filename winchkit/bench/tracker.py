@@ -107,7 +107,7 @@ def mean_pose(poses: list[TrackedPose]) -> MeanPose:
     return MeanPose(len(poses), places.mean(axis=0), rotation, spread)
 
 
-class Tracker:
+class TrackerReceiver:
     """Receiver of a tracker's datagrams; thread-safe.
 
     Parameters

@@ -8,7 +8,7 @@ from winchkit.arguments import number, positive
 from winchkit.bench.cells.tares import await_device_tare, host_tare
 from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
 from winchkit.bench.control.homing_motion import HomingRequest
-from winchkit.bench.control.motion import Held, Jog, MotionSource, Move, StartGate, Trim
+from winchkit.bench.control.motion import Held, Jog, MotionSource, PlannedMove, StartGate, Trim
 from winchkit.bench.control.snapshot import Direction, Trip
 from winchkit.bench.control.supervisor import direction_of
 from winchkit.bench.control.tension_control import (
@@ -449,7 +449,7 @@ class Winch(WinchStatus):
         acceleration: float | None = None,
         *,
         hold: bool = False,
-    ) -> Move:
+    ) -> PlannedMove:
         """The move that ``move_to`` would make; nothing begins. Raises as that does.
 
         Parameters
@@ -463,7 +463,7 @@ class Winch(WinchStatus):
 
         Returns
         -------
-        Move
+        PlannedMove
             The move, for :meth:`begin`.
         """
         self.require_length()
@@ -472,7 +472,7 @@ class Winch(WinchStatus):
         if acceleration is not None:
             acceleration = number("move_to", "acceleration", acceleration)
         cable = self._parts.cable
-        move = Move(
+        move = PlannedMove(
             cable,
             self.wiring.limits,
             length,

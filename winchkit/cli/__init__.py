@@ -15,7 +15,7 @@ import click
 
 from winchkit import wings
 from winchkit.cli.core.command import Example
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.outcome import finish
 from winchkit.version import __version__
 
@@ -24,87 +24,105 @@ from winchkit.version import __version__
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
-SECTIONS: dict[str, dict[str, At]] = {
+SECTIONS: dict[str, dict[str, CommandPlace]] = {
     "Model and runs": {
-        "demo": At(
+        "demo": CommandPlace(
             "winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."
         ),
-        "compare": At(
+        "compare": CommandPlace(
             "winchkit.cli.model.compare",
             "Compare runs with a model: its errors, by variable.",
         ),
-        "diagnose": At(
+        "diagnose": CommandPlace(
             "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
         ),
-        "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
-        "forward": At(
+        "add": CommandPlace("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
+        "forward": CommandPlace(
             "winchkit.cli.model.forward", "Simulate a profile's motion under a torque or loops."
         ),
-        "remove": At("winchkit.cli.model.add", "Remove an effect from a profile.", "remove"),
-        "undo": At(
+        "remove": CommandPlace(
+            "winchkit.cli.model.add", "Remove an effect from a profile.", "remove"
+        ),
+        "undo": CommandPlace(
             "winchkit.cli.model.ledger", "Undo the last add or remove of a profile.", "undo"
         ),
-        "ledger": At(
+        "ledger": CommandPlace(
             "winchkit.cli.model.ledger",
             "List the changes of a profile, with their errors.",
         ),
-        "serve": At(
+        "serve": CommandPlace(
             "winchkit.cli.web.serve",
             "Serve the page in the browser: all of this, with figures.",
         ),
-        "profile": At("winchkit.cli.model.profile", "Write the profile of a winch of your own."),
-        "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
-        "effects": At("winchkit.cli.model.effects", "List the physical effects, or describe one."),
-        "size": At(
+        "profile": CommandPlace(
+            "winchkit.cli.model.profile", "Write the profile of a winch of your own."
+        ),
+        "plan": CommandPlace("winchkit.cli.model.plan", "Propose the next motion programme."),
+        "effects": CommandPlace(
+            "winchkit.cli.model.effects", "List the physical effects, or describe one."
+        ),
+        "size": CommandPlace(
             "winchkit.cli.model.size", "Size a winch: compare each requirement with its limit."
         ),
     },
     "Bench": {
-        "commission": At(
+        "commission": CommandPlace(
             "winchkit.cli.bench.commission",
             "Commission a bench: test, confirm, record.",
         ),
-        "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
-        "move": At("winchkit.cli.bench.move", "Move one winch, or all, to a cable length."),
-        "hold-tension": At(
+        "jog": CommandPlace("winchkit.cli.bench.jog", "Move a winch by hand."),
+        "move": CommandPlace(
+            "winchkit.cli.bench.move", "Move one winch, or all, to a cable length."
+        ),
+        "hold-tension": CommandPlace(
             "winchkit.cli.bench.hold_tension", "Keep the tension of a cable by the winch's speed."
         ),
-        "home": At(
+        "home": CommandPlace(
             "winchkit.cli.bench.home", "Find the drive's zero, or define the present length."
         ),
-        "run": At("winchkit.cli.bench.run", "Execute a motion programme and log it."),
-        "stop": At("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
-        "reset": At(
+        "run": CommandPlace("winchkit.cli.bench.run", "Execute a motion programme and log it."),
+        "stop": CommandPlace("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
+        "reset": CommandPlace(
             "winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."
         ),
-        "monitor": At("winchkit.cli.bench.monitor", "Show a bench live."),
-        "log": At("winchkit.cli.log.log", "Log a bench; inspect, recover, replay logs."),
-        "tare": At("winchkit.cli.bench.tare", "Tare a load cell."),
+        "monitor": CommandPlace("winchkit.cli.bench.monitor", "Show a bench live."),
+        "log": CommandPlace("winchkit.cli.log.log", "Log a bench; inspect, recover, replay logs."),
+        "tare": CommandPlace("winchkit.cli.bench.tare", "Tare a load cell."),
     },
     "Devices": {
-        "cell": At("winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
-        "scan": At("winchkit.cli.drive.scan", "List the nodes of a CAN bus."),
-        "info": At("winchkit.cli.drive.info", "Show identity, state and limits of a drive."),
-        "config": At(
+        "cell": CommandPlace(
+            "winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."
+        ),
+        "scan": CommandPlace("winchkit.cli.drive.scan", "List the nodes of a CAN bus."),
+        "info": CommandPlace(
+            "winchkit.cli.drive.info", "Show identity, state and limits of a drive."
+        ),
+        "config": CommandPlace(
             "winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."
         ),
-        "lss": At("winchkit.cli.drive.lss", "Set node number and bit rate of a drive (CiA 305)."),
-        "busload": At(
+        "lss": CommandPlace(
+            "winchkit.cli.drive.lss", "Set node number and bit rate of a drive (CiA 305)."
+        ),
+        "busload": CommandPlace(
             "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
         ),
     },
     "Files and simulation": {
-        "check": At("winchkit.cli.files.check", "Check files of any kind and list every fault."),
-        "import": At(
+        "check": CommandPlace(
+            "winchkit.cli.files.check", "Check files of any kind and list every fault."
+        ),
+        "import": CommandPlace(
             "winchkit.cli.files.import_logs",
             "Import recordings of other programs: channels and units.",
         ),
-        "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
-        "export-model": At(
+        "export": CommandPlace(
+            "winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."
+        ),
+        "export-model": CommandPlace(
             "winchkit.cli.files.export_model", "Write a profile as C, for MuJoCo, or as JSON."
         ),
-        "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
-        "completion": At(
+        "sim": CommandPlace("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
+        "completion": CommandPlace(
             "winchkit.cli.files.completion", "Print the completion script of a shell."
         ),
     },
@@ -112,12 +130,12 @@ SECTIONS: dict[str, dict[str, At]] = {
 """The core's commands by subject, as ``--help`` lists them; those of the wings follow."""
 
 
-def _of(declared: Iterable[wings.Wing]) -> Iterator[tuple[str, str, At]]:
+def _of(declared: Iterable[wings.Wing]) -> Iterator[tuple[str, str, CommandPlace]]:
     """Section, name and place of the commands of wings."""
     for wing in declared:
         for section, commands in wing.commands.items():
             for name, (module, words) in commands.items():
-                yield section, name, At(module, words)
+                yield section, name, CommandPlace(module, words)
 
 
 class _Main(LazyGroup):

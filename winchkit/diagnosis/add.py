@@ -14,7 +14,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
@@ -38,7 +38,7 @@ from winchkit.runs.run import Run
 
 _STARTS = 4
 """Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
-_Fits = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
+_Fits = tuple[TimeSeriesSelection, tuple[Fit, BandNoise], tuple[Fit, BandNoise]]
 """Engine, and the fits before and after the addition, each with its noise."""
 
 
@@ -256,7 +256,7 @@ def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSerie
 
 def _fitted(
     engine: TimeSeriesSelection, effect_id: str
-) -> tuple[tuple[Fit, Noise], tuple[Fit, Noise]]:
+) -> tuple[tuple[Fit, BandNoise], tuple[Fit, BandNoise]]:
     """The profile's effects and those with the new one, each with its noise."""
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     trials = [
@@ -283,7 +283,7 @@ def _placed(effect: Effect, dataset: Dataset) -> Effect:
     return placed(effect, min(float(x.min()) for x in ranges), max(float(x.max()) for x in ranges))
 
 
-def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) -> list[Score]:
+def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: BandNoise) -> list[Score]:
     """Grid points of an effect with the largest scores."""
     initial_model = engine.refit(engine.initial_model, noise)
     projected = engine.projected(initial_model, noise)
@@ -346,7 +346,7 @@ def remove(
     dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
     catalogue = catalogue_of(profile, catalogue or load_catalogue())
 
-    def fitted_on(runs: Dataset) -> tuple[TimeSeriesSelection, Fit, Noise]:
+    def fitted_on(runs: Dataset) -> tuple[TimeSeriesSelection, Fit, BandNoise]:
         engine = selection_engine(runs, catalogue)
         return engine, *engine.fit_with_noise(engine.initial_model)
 

@@ -24,7 +24,7 @@ from winchkit.diagnosis.residuals.attribution import (
     attributions,
     harmonics,
 )
-from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
+from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
 from winchkit.diagnosis.results import Diagnosis, NextRun, OutputFit, Step
 from winchkit.diagnosis.search import (
     ProgressCallback,
@@ -54,7 +54,7 @@ from winchkit.diagnosis.steps import (
 )
 from winchkit.diagnosis.verdict.decision import (
     MOSTLY,
-    Measured,
+    OutputEvidence,
     measured,
     output_fits,
     remaining_share,
@@ -382,7 +382,7 @@ def _steps(
     sets: Sequence[EquivalenceSet],
     outputs: Mapping[str, OutputFit],
     *,
-    known: Measured,
+    known: OutputEvidence,
     spread: Spread,
 ) -> Iterator[Step]:
     """Every addition with its share, law and doubts."""
@@ -448,7 +448,7 @@ def _rounded_law(
 
 def _traces(
     engine: TimeSeriesSelection, result: SelectionResult, *, named: bool
-) -> tuple[Trace, ...]:
+) -> tuple[OutputTrace, ...]:
     """Measured and predicted outputs; by the profile too where effects were named."""
     before = result.initial_model.residual
     if not named:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 from winchkit.diagnosis.data.low_pass import RemovedBand
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.maps import ResidualMap
-from winchkit.diagnosis.residuals.traces import PoseTrace, Trace, trace_columns
+from winchkit.diagnosis.residuals.traces import OutputTrace, PoseTrace, trace_columns
 from winchkit.effects.empirical import empirical_id
 from winchkit.effects.placement import HOME
 from winchkit.fit_statistics import FitStatistics
@@ -68,7 +68,7 @@ class Comparison(Plotted, Tabular):
     """Share of the measured samples that is compared, by output."""
     caveats: tuple[str, ...] = ()
     """Codes of what these runs cannot exclude."""
-    traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
+    traces: tuple[OutputTrace | PoseTrace, ...] = field(default=(), compare=False)
     """Measured and predicted outputs of every run, or errors of every pose."""
     removed: tuple[RemovedBand, ...] = ()
     """What the low-pass of every output that has one removes."""
@@ -300,7 +300,7 @@ class Diagnosis(Plotted, Tabular):
     run_offsets: tuple[RunOffset, ...] = ()
     """Offsets of instruments that have another one in every run. Those of a held-out run are its
     own in every held-out error."""
-    traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
+    traces: tuple[OutputTrace | PoseTrace, ...] = field(default=(), compare=False)
     """Measured and predicted outputs of every run, or errors of every pose."""
     removed: tuple[RemovedBand, ...] = ()
     """What the low-pass of every output that has one removes."""

@@ -19,7 +19,7 @@ from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinea
 from winchkit.diagnosis.regression.cross_validation import CERTAIN, held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.run_offsets import with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import predicts_better
@@ -117,7 +117,7 @@ def _with_transitions(
     """
     transitions: dict[str, float] = {}
 
-    def is_rounded(present: Fit, noise: Noise) -> bool:
+    def is_rounded(present: Fit, noise: BandNoise) -> bool:
         if is_enough(present):
             return True
         transitions.update(scanned_transitions(engine, present, noise))
@@ -224,7 +224,7 @@ def with_offsets_where_better(
     dataset: Dataset,
     found: Found,
     again: Callable[[Dataset], Found],
-    final: Callable[[Found], tuple[TimeSeriesSelection, Fit, Noise]],
+    final: Callable[[Found], tuple[TimeSeriesSelection, Fit, BandNoise]],
 ) -> tuple[Dataset, Found]:
     """Result with an offset per run, where one is found that predicts held-out blocks better.
 

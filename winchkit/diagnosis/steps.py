@@ -23,12 +23,12 @@ from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import CandidateScore, Doubt, Estimate, OutputFit, Place, Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
-from winchkit.diagnosis.verdict.curve_fits import Curve
+from winchkit.diagnosis.verdict.curve_fits import FittedCurve
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible
 
@@ -126,7 +126,7 @@ def with_standing(
     *,
     index: int,
     standing: Standing,
-    curve: tuple[Curve, float] | None = None,
+    curve: tuple[FittedCurve, float] | None = None,
     small: bool = False,
 ) -> Step:
     """A step with its share, law and doubts.
@@ -165,7 +165,7 @@ def _doubts(
     result: SelectionResult,
     step: Step,
     index: int,
-    curve: tuple[Curve, float] | None,
+    curve: tuple[FittedCurve, float] | None,
 ) -> list[Doubt]:
     out = []
     regression, term = engine.regression, result.final.hypothesis.terms[index]
@@ -225,7 +225,7 @@ def _values_of_rival(
     return estimates(regression, fitted, spread)[index][1]
 
 
-def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:
+def _gains(engine: SelectionEngine, final: Fit, noise: BandNoise) -> list[float]:
     """Relative decrease of the held-out χ² by each addition, in the order of selection."""
     hypothesis = final.hypothesis
     squares, folds = [], engine.folds(final, noise)

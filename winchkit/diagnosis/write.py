@@ -11,7 +11,7 @@ from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.series import single_orders
 from winchkit.effects.term import Term
-from winchkit.profile_edit.fitted import Fitted, write_fitted, write_without
+from winchkit.profile_edit.fitted import FittedTerm, write_fitted, write_without
 from winchkit.profile_edit.ledger import Judged
 
 
@@ -73,11 +73,11 @@ def _provenance(
     terms: Sequence[tuple[Term, Mapping[str, Estimate]]],
     outputs: Mapping[str, OutputFit],
     runs: Sequence[str],
-) -> tuple[list[Fitted], Judged]:
+) -> tuple[list[FittedTerm], Judged]:
     """Fitted terms and the ledger's figures, dated today."""
     today = datetime.now(UTC).date()
     fitted = [
-        Fitted(single, std, runs, today)
+        FittedTerm(single, std, runs, today)
         for term, values in terms
         for single, std in single_orders(term, {n: e.std for n, e in values.items()})
     ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Counters, Tally
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,15 +151,15 @@ class Publisher:
         """Calibration and tare by the host; may be replaced at any time."""
         self.moving: Callable[[], bool] = _never
         """Whether the winch moves now, so that the counts should move as well."""
-        self.latest: Reading | None = None
-        self.listeners: list[Callable[[Reading], None]] = []
+        self.latest: InstrumentReading | None = None
+        self.listeners: list[Callable[[InstrumentReading], None]] = []
         self.rate = rate
         """Of the device, conversions a second."""
         self._frozen_detector = FrozenDetector()
 
     def publish(
         self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
-    ) -> Reading:
+    ) -> InstrumentReading:
         """Make a reading of what the device says (SI), judge it and publish it to the listeners.
 
         Without a value (NaN) or with a flag that makes it unusable it is NaN.
@@ -175,7 +175,7 @@ class Publisher:
         net = total = math.nan
         if quality.usable:
             net, total = self.scale.apply(value, gross)
-        reading = Reading(
+        reading = InstrumentReading(
             net,
             total,
             counts,
@@ -191,7 +191,7 @@ class Publisher:
             listener(reading)
         return reading
 
-    def _frozen(self, counts: float, before: Reading | None, when: Sampled) -> bool:
+    def _frozen(self, counts: float, before: InstrumentReading | None, when: Sampled) -> bool:
         if before is None or not math.isfinite(counts):
             return False
         conversions = (when.t_receive - before.t_receive) * self.rate
@@ -205,12 +205,12 @@ class InstrumentReadings:
     _clock: Clock
 
     @property
-    def latest(self) -> Reading | None:
+    def latest(self) -> InstrumentReading | None:
         """Newest reading."""
         return self.publisher.latest
 
     @property
-    def listeners(self) -> list[Callable[[Reading], None]]:
+    def listeners(self) -> list[Callable[[InstrumentReading], None]]:
         """Called with every reading, on the thread that receives it."""
         return self.publisher.listeners
 

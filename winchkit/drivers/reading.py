@@ -63,7 +63,7 @@ _UNUSABLE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class InstrumentReading:
     """One answer of an instrument; times are on the bench's clock, s."""
 
     value: float
@@ -91,7 +91,7 @@ class Sensor(Protocol):
     """A reading older than this is stale, s."""
 
     @property
-    def latest(self) -> Reading | None:
+    def latest(self) -> InstrumentReading | None:
         """Newest reading; other threads read it."""
 
     @property
@@ -99,7 +99,7 @@ class Sensor(Protocol):
         """Why there is no new reading, while there is none."""
 
     @property
-    def listeners(self) -> list[Callable[[Reading], None]]:
+    def listeners(self) -> list[Callable[[InstrumentReading], None]]:
         """Called with every reading, on the thread of the slow devices."""
 
     @property

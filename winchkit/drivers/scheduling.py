@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 from winchkit.drivers.clock import Clock
 
 
-class Event(Protocol):
+class WaitableEvent(Protocol):
     """Used part of ``threading.Event``."""
 
     def is_set(self) -> bool:
@@ -51,7 +51,7 @@ class Scheduler(Protocol):
     def thread(self, target: Callable[[], None], name: str) -> Thread:
         """A thread, not started yet."""
 
-    def event(self) -> Event:
+    def event(self) -> WaitableEvent:
         """An event."""
 
     def lock(self) -> AbstractContextManager[None]:
@@ -77,7 +77,7 @@ def thread_of(clock: Clock, target: Callable[[], None], name: str) -> Thread:
     return threading.Thread(target=target, name=name, daemon=True)
 
 
-def event_of(clock: Clock) -> Event:
+def event_of(clock: Clock) -> WaitableEvent:
     """An event."""
     return clock.event() if isinstance(clock, Scheduler) else threading.Event()
 

@@ -36,12 +36,12 @@ _PIECES = 3
 one for each sign of the load and one to reach the right piece."""
 ON_MOTION = frozenset(
     {Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND, Stage.CABLE_WEIGHT, Stage.PULLEY, Stage.GEARBOX}
-) | {Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL}
+) | {Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL}
 """Stages between the motor's torque and its motion; the others change readings only."""
 
 
 @dataclass(frozen=True)
-class State:
+class EffectState:
     """State of an effect with memory."""
 
     term: Term
@@ -76,7 +76,7 @@ class Balance:
     """Of a known mass, N."""
     rates: tuple[Expression, ...]
     """Of the states, 1/s, without their bounds."""
-    states: tuple[State, ...]
+    states: tuple[EffectState, ...]
 
     @property
     def is_directed(self) -> bool:
@@ -89,7 +89,7 @@ class _Tracer:
     """Modifiers of the terms on symbols, and the states that they bring."""
 
     def __init__(self) -> None:
-        self.states: dict[str, State] = {}
+        self.states: dict[str, EffectState] = {}
         self.rates: dict[str, Expression] = {}
 
     def modifier(self, term: Term) -> Modifier:
@@ -106,7 +106,7 @@ class _Tracer:
         assert effect.dynamics is not None
         start = effect.parameter("start")
         name = f"state_{effect.id.replace('-', '_')}" + (f"_{at.pulley}" if at.pulley >= 0 else "")
-        state = State(term, name, start.low, start.high, term.values["start"])
+        state = EffectState(term, name, start.low, start.high, term.values["start"])
         values = {**term.values, "start": traced([symbol(name)])}
         self.states[name] = state
         self.rates[name] = expression(effect.dynamics.rate(value, at, values))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import isinf, isnan
 
 from winchkit.dynamics.expression import Expression, Operation, ordered, statements
-from winchkit.dynamics.step import BEFORE, INPUTS, OUTPUTS, Step, step_of
+from winchkit.dynamics.step import BEFORE, INPUTS, OUTPUTS, LineSample, step_of
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -127,7 +127,7 @@ def _literal(value: float, p: str) -> str:
 
 
 def _body(
-    step: Step,
+    step: LineSample,
     p: str,
     roots: Sequence[Expression],
     targets: Sequence[str],

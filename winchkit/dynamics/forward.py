@@ -11,7 +11,7 @@ from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.dynamics.balance import balance
 from winchkit.dynamics.drives import RECORDED, Inputs, cascade
-from winchkit.dynamics.integration import Integrator, Motion, holding_torque
+from winchkit.dynamics.integration import Integrator, SimulatedMotion, holding_torque
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term, act, modifiers_of
@@ -155,7 +155,7 @@ def simulated(
 
 def motion_of(
     profile: WinchProfile, terms: Sequence[Term], setup: Setup, tolerance: float = 1e-8
-) -> Motion:
+) -> SimulatedMotion:
     """The motion of a setup, without the readings of the instruments."""
     law = balance(profile, terms, setup.load_mass, is_load_known="load" in setup.inputs.signals)
     drive, inputs = RECORDED, setup.inputs
@@ -307,7 +307,7 @@ def _angles(
 
 
 def _readings(
-    profile: WinchProfile, terms: Sequence[Term], setup: Setup, motion: Motion
+    profile: WinchProfile, terms: Sequence[Term], setup: Setup, motion: SimulatedMotion
 ) -> dict[str, Channel]:
     """Readings of the instruments along a motion, without noise."""
     torque = motion.torque
@@ -331,7 +331,7 @@ def _readings(
     return out
 
 
-def _at(profile: WinchProfile, motion: Motion, torque: Array) -> LineMotion:
+def _at(profile: WinchProfile, motion: SimulatedMotion, torque: Array) -> LineMotion:
     """Inputs of the modifiers along a simulated motion: its own derivatives and directions."""
     line = Line(profile)
     warm = np.full_like(motion.time, _TEMPERATURE)

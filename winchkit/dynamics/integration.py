@@ -87,7 +87,7 @@ def _advanced(
 
 
 @dataclass(frozen=True)
-class Motion:
+class SimulatedMotion:
     """A simulated motion; arrays (n,), SI."""
 
     time: Array
@@ -111,7 +111,7 @@ class _Mode:
 
 
 @dataclass(frozen=True)
-class _Point:
+class _Instant:
     """A time with the states, the mode and the inputs from there on."""
 
     time: float
@@ -163,7 +163,7 @@ class Integrator:
         roots = [b.acceleration, b.inertia, self.drive.torque, b.load, *b.rates]
         return compiled(substituted(roots, torque), self._arguments)
 
-    def run(self, time: Array, angle: float, speed: float) -> Motion:
+    def run(self, time: Array, angle: float, speed: float) -> SimulatedMotion:
         """Integrate from an angle and a speed at the first of the times (n,), s.
 
         Raises UsageError where the cable becomes slack or the motion cannot be integrated.
@@ -174,7 +174,7 @@ class Integrator:
         rows: list[Numbers] = []
         intervals, breaks = self.inputs.rows(), self.inputs.time.tolist()
         row = intervals[0]
-        at = _Point(breaks[0], y, self._decided(breaks[0], y, row), row)
+        at = _Instant(breaks[0], y, self._decided(breaks[0], y, row), row)
         rows.append(self._row(at))
         length, k = breaks[1] - breaks[0], 0
         for sample in time.tolist()[1:]:
@@ -185,9 +185,9 @@ class Integrator:
                 end = breaks[k + 1] if k < len(intervals) - 1 else sample
                 at, length = self._advance(at, length, min(sample, end))
             rows.append(self._row(at))
-        return Motion(time, *np.array(rows).T)
+        return SimulatedMotion(time, *np.array(rows).T)
 
-    def _advance(self, at: _Point, length: float, goal: float) -> tuple[_Point, float]:
+    def _advance(self, at: _Instant, length: float, goal: float) -> tuple[_Instant, float]:
         """One step at most; returns where it ends and the length of the next step."""
         h = min(length, goal - at.time)
         new, error = self._step(at, h)
@@ -209,7 +209,7 @@ class Integrator:
         there = replace(at, time=at.time + h, states=self._step(at, h)[0])
         return self._switched(there, which), length
 
-    def _step(self, at: _Point, h: float) -> tuple[Numbers, float]:
+    def _step(self, at: _Instant, h: float) -> tuple[Numbers, float]:
         step = self._still if at.mode.is_still else self._moving
         mode = at.mode
         *new, error = step(h, at.time, *at.states, mode.direction, *mode.open, *at.inputs)
@@ -232,7 +232,7 @@ class Integrator:
             ),
         ]
 
-    def _first_event(self, at: _Point, h: float, new: Numbers) -> tuple[float, int] | None:
+    def _first_event(self, at: _Instant, h: float, new: Numbers) -> tuple[float, int] | None:
         """Length of the step to the first event, and its number; None without one."""
 
         def behind(length: float, i: int) -> float:
@@ -255,7 +255,7 @@ class Integrator:
             found.append((float(brentq(behind, inner, h, args=(i,), xtol=_ROOT)), i))
         return min(found) if found else None
 
-    def _switched(self, at: _Point, event: int) -> _Point:
+    def _switched(self, at: _Instant, event: int) -> _Instant:
         """States and mode behind an event; a speed of zero and a bound are made exact."""
         time, mode, row = at.time, at.mode, at.inputs
         if mode.is_still:
@@ -316,7 +316,7 @@ class Integrator:
             for v, s, r in zip(y[2:], states, rates, strict=False)
         )
 
-    def _row(self, at: _Point) -> Numbers:
+    def _row(self, at: _Instant) -> Numbers:
         """Angle, speed, acceleration, torque, load and direction."""
         time, y, mode = at.time, at.states, at.mode
         inputs = (time, *y, mode.direction, *mode.open, *at.inputs)

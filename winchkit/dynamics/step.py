@@ -61,7 +61,7 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Memory:
+class EffectMemory:
     """State of an effect between two samples."""
 
     name: str
@@ -70,11 +70,11 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Step:
+class LineSample:
     """One sample of a line."""
 
     outputs: dict[str, Expression]
-    memories: tuple[Memory, ...]
+    memories: tuple[EffectMemory, ...]
     constants: tuple[Constant, ...]
     at_rest: tuple[Expression, Expression]
     """Cable length and arm of ``motor_angle`` and ``load`` at rest, without memory."""
@@ -86,7 +86,7 @@ class _Recorder:
     """Modifiers of the terms on symbols; the memory that they hand over."""
 
     def __init__(self) -> None:
-        self.memories: dict[str, Memory] = {}
+        self.memories: dict[str, EffectMemory] = {}
 
     def modifier(self, term: Term, values: Values) -> Modifier:
         effect = term.effect
@@ -99,13 +99,13 @@ class _Recorder:
             own = {**values, "start": traced(symbol(name))}
             after = act(effect, own, value, at)
             end = expression(effect.carry(after, value, at, own))
-            self.memories[name] = Memory(name, float(term.values["start"]), end)
+            self.memories[name] = EffectMemory(name, float(term.values["start"]), end)
             return after
 
         return Modifier(effect.stage, with_memory, effect.order)
 
 
-def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch") -> Step:
+def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch") -> LineSample:
     """Trace one sample.
 
     ``prefix``: of the names in the template. Raises UsageError with the effects that have no step,
@@ -136,7 +136,7 @@ def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch")
     at = resting.moments(none, one["motor_angle"], none, one["load"], traced([20.0]))
     length, arm = resting.lengths_and_arms(at)
     nominal = expression(line.nominal_motor_angle(traced([symbol("length")])))
-    return Step(
+    return LineSample(
         outputs, tuple(recorder.memories.values()), tuple(constants.values()),
         (expression(length), expression(arm)), nominal,
     )  # fmt: skip

@@ -86,7 +86,7 @@ _LENGTHS = (3e-4, 3e-3, 0.02, 0.1)
 
 
 @dataclass(frozen=True)
-class Record:
+class PulleyRecord:
     """Both tensions of one run and the motion of the cable; arrays (n,), finite."""
 
     cell: Array
@@ -112,7 +112,7 @@ class Identified:
     """Parameters that ended at a bound; their standard deviations mean little."""
 
 
-def record_of(run: Run, profile: WinchProfile) -> Record:
+def record_of(run: Run, profile: WinchProfile) -> PulleyRecord:
     """Both tensions and the nominal motion of a run of one winch, without rows with NaN.
 
     Raises RunError without ``tension``, and without ``load`` and ``load_mass``.
@@ -129,11 +129,11 @@ def record_of(run: Run, profile: WinchProfile) -> Record:
     assert motion.load is not None
     rows = np.column_stack([run["tension"], motion.load, -motion.at.free_length])
     good = rows[np.isfinite(rows).all(axis=1)]
-    return Record(*(np.ascontiguousarray(column) for column in good.T))
+    return PulleyRecord(*(np.ascontiguousarray(column) for column in good.T))
 
 
 def identify_dahl(
-    records: Sequence[Record],
+    records: Sequence[PulleyRecord],
     wraps: Sequence[Sequence[float]],
     *,
     shape: float | None = None,
@@ -169,7 +169,7 @@ def identify_dahl(
     """
     from scipy.optimize import least_squares
 
-    require_types(records, Record, "records")
+    require_types(records, PulleyRecord, "records")
     samples = sum(len(record.cell) for record in records)
     if samples < _LEAST_SAMPLES or not wraps:
         raise UsageError(
@@ -192,7 +192,7 @@ def identify_dahl(
 class _Problem:
     """Residuals and derivatives over (ln μ, ln σ, β) of every group and the start of every run."""
 
-    records: tuple[Record, ...]
+    records: tuple[PulleyRecord, ...]
     wraps: tuple[tuple[float, ...], ...]
     shape: float | None
     kernels: Kernels

@@ -84,7 +84,7 @@ def is_smoother(measured: Array, differences: Array) -> bool:
 
 
 @dataclass(frozen=True)
-class Clock:
+class SamplingTimes:
     """Sampling times, and derivatives of signals sampled at them.
 
     Derivatives are differences where the samples are even. Where they are not, a smoothing spline

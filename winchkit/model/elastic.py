@@ -20,7 +20,7 @@ _TOLERANCE = 1e-13
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearLaw:
     """F = k1 ε + k0 (Eq. 4)."""
 
     k1: float
@@ -40,7 +40,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Quartic:
+class QuarticLaw:
     """F = k4 ε⁴ + k3 ε³ + k2 ε² + k1 ε + k0 (Eq. 5), on its rising branch from zero strain."""
 
     k1: float
@@ -77,7 +77,7 @@ class Quartic:
 
 
 @dataclass(frozen=True)
-class Exponential:
+class ExponentialLaw:
     """F = exp(k1 ε) + k0 in newtons (Eq. 6)."""
 
     k1: float
@@ -99,7 +99,7 @@ class Exponential:
         return log(above) / self.k1 if above > 0.0 else nan
 
 
-ElongationLaw = Linear | Quartic | Exponential
+ElongationLaw = LinearLaw | QuarticLaw | ExponentialLaw
 Strain = Callable[[float], float]
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock, direction
+from winchkit.model.derivatives import SamplingTimes, direction
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
@@ -37,7 +37,7 @@ class Motion:
     """The nominal line along one run, computed once: inputs of the modifiers, and the load."""
 
     at: At
-    clock: Clock
+    clock: SamplingTimes
     load: Array | None
     """Tension at the platform end, N, where measured or known."""
     drum_tension: Array | None
@@ -101,7 +101,7 @@ class Line:
         """Derivatives, directions and cable force along a run."""
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
-        clock = signals.clock or Clock(time - time[0], angle, signals.motor_velocity)
+        clock = signals.clock or SamplingTimes(time - time[0], angle, signals.motor_velocity)
         arm, rate = self._nominal_arm(angle), clock.rate
         speed = arm * (rate - clock.gradient(angle)) - clock.gradient(length)
         load, mass, discretization, load_std = signals.load, None, None, None
@@ -224,7 +224,7 @@ class Line:
         torque = drum_side * kinematics.arm
         if at.predicted_torque is not None:
             torque = at.predicted_torque
-        for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
+        for stage in (Stage.GEARBOX, Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL):
             torque = self._through(stage, torque, at)
         return torque
 

@@ -112,7 +112,7 @@ def presliding_step(step: Step) -> PulleyStep:
 
 
 @dataclass(frozen=True)
-class Presliding:
+class DahlPulleys:
     """Pulleys whose friction builds up with distance before it slides (Dahl, Eq. 25)."""
 
     friction: float

@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Any
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
@@ -57,10 +57,10 @@ class Stage(IntEnum):
     """Value: reading of the load cell, N."""
     GEARBOX = 10
     """Value: torque of the cable at the motor, N m."""
-    TORQUE_CONSTANT = 11
-    """Value: torque of the cable at the motor, in the drive's units."""
-    MOTOR = 12
+    MOTOR = 11
     """Value: torque with the motor's own terms, N m."""
+    TORQUE_CONSTANT = 12
+    """Value: torque of the motor in the drive's units, N m."""
     TORQUE_SIGNAL = 13
     """Value: torque reported by the drive, N m."""
     LINE_PLACE = 14
@@ -88,8 +88,8 @@ PARTS = {
     Stage.PULLEY: "pulley",
     Stage.CELL: "cell",
     Stage.GEARBOX: "gear",
-    Stage.TORQUE_CONSTANT: "drive",
     Stage.MOTOR: "motor",
+    Stage.TORQUE_CONSTANT: "drive",
     Stage.TORQUE_SIGNAL: "drive",
     Stage.LINE_PLACE: "frame",
     Stage.HOME_LENGTH: "drum",
@@ -145,7 +145,7 @@ class Signals:
     """Of another model, in place of the torque of the cable, N m."""
     rate_noise: float | None = None
     """Standard deviation of the noise of the motor's rate, rad/s; None: that of its derivatives."""
-    clock: Clock | None = None
+    clock: SamplingTimes | None = None
     """Derivatives of the motor angle, where they were computed before; None to compute them."""
 
 

@@ -32,7 +32,7 @@ _HOME_LENGTH = "home-length"
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedTerm:
     """A term with the standard deviations of its values, and their origin."""
 
     term: Term
@@ -41,7 +41,7 @@ class Fitted:
     date: date
 
 
-def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path, judged: Judged) -> None:
+def write_fitted(source: Path, fitted: Sequence[FittedTerm], out: Path, judged: Judged) -> None:
     """Copy the profile ``source`` to ``out`` with fitted effects, the last one new.
 
     Raises FileError where a file cannot be read or written.
@@ -55,7 +55,7 @@ def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path, judged: Judg
 
 
 def write_without(
-    source: Path, effect_id: str, fitted: Sequence[Fitted], out: Path, judged: Judged
+    source: Path, effect_id: str, fitted: Sequence[FittedTerm], out: Path, judged: Judged
 ) -> None:
     """Copy the profile ``source`` to ``out`` without an effect, the others as fitted.
 
@@ -99,7 +99,7 @@ def _take_out(document: Any, label: str) -> None:
         del tables[last]
 
 
-def _put(document: Any, fitted: Sequence[Fitted]) -> None:
+def _put(document: Any, fitted: Sequence[FittedTerm]) -> None:
     """Update the present effects and append the others."""
     unused = list(effect_tables(document))
     for item in fitted:
@@ -123,7 +123,7 @@ def _put(document: Any, fitted: Sequence[Fitted]) -> None:
         _put_home_lengths(document, item)
 
 
-def _put_home_lengths(document: Any, item: Fitted) -> None:
+def _put_home_lengths(document: Any, item: FittedTerm) -> None:
     """Write home lengths that were fitted with a cable's law on a robot, as an effect."""
     values = item.term.values
     homes = {n.removeprefix(HOME): values[n] for n in values if n.startswith(HOME)}
@@ -147,7 +147,7 @@ def _of_lines(table: Any) -> bool:
     return table["id"] == _HOME_LENGTH and isinstance(table.get("length"), Mapping)
 
 
-def _update_shorthand(document: Any, item: Fitted) -> bool:
+def _update_shorthand(document: Any, item: FittedTerm) -> bool:
     """Write a refitted value to its shorthand key; False where the profile has no such key.
 
     For an infinite value (a rigid cable) the key is removed.
@@ -164,7 +164,7 @@ def _update_shorthand(document: Any, item: Fitted) -> bool:
     return True
 
 
-def _fill(table: Any, item: Fitted) -> None:
+def _fill(table: Any, item: FittedTerm) -> None:
     effect = item.term.effect
     for parameter in effect.parameters:
         if parameter.name.startswith(HOME):
@@ -177,7 +177,7 @@ def _fill(table: Any, item: Fitted) -> None:
     table["fitted"] = _provenance(item)
 
 
-def _provenance(item: Fitted) -> InlineTable:
+def _provenance(item: FittedTerm) -> InlineTable:
     std = tomlkit.inline_table()
     for name, value in item.std.items():
         if isnan(value) or name.startswith(HOME):

@@ -19,7 +19,7 @@ LADDER_UNITS: Mapping[str, str] = {**RESULT_UNITS, "platform_position": "m"}
 
 
 @dataclass(frozen=True)
-class Rung:
+class HistoryStep:
     """One step with its held-out errors by output, SI."""
 
     did: str
@@ -43,7 +43,7 @@ class Rung:
         }
 
 
-def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
+def ladder(profile: WinchProfile | RobotProfile) -> tuple[HistoryStep, ...]:
     """Return every step of a profile's ledger, oldest first; raises FileError for a wrong quantity.
 
     Parameters
@@ -60,9 +60,9 @@ def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
     return tuple(_rung(entry) for entry in profile.ledger)
 
 
-def _rung(entry: LedgerEntry) -> Rung:
+def _rung(entry: LedgerEntry) -> HistoryStep:
     before, after, noise = (_si(entry, name) for name in ("before", "after", "noise"))
-    return Rung(entry.did, entry.effect, entry.date, entry.runs, before, after, noise)
+    return HistoryStep(entry.did, entry.effect, entry.date, entry.runs, before, after, noise)
 
 
 def _si(entry: LedgerEntry, name: str) -> dict[str, float]:

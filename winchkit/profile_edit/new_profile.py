@@ -21,7 +21,7 @@ from winchkit.profile_edit.drawing import (
 )
 from winchkit.runs.files import refuse_existing
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.reading.source import Source
+from winchkit.schema.reading.source import TomlSource
 from winchkit.schema.reading.tables import marker_at, read_table, type_at
 from winchkit.units import number_and_unit
 
@@ -108,7 +108,9 @@ def new_profile(
     if not pulleys:
         unknown["pulley"] = NO_PULLEY
     name = file.stem
-    found = read_table(Source(str(file), "winch", tree, {}), WinchProfile, {"name": name, **tree})
+    found = read_table(
+        TomlSource(str(file), "winch", tree, {}), WinchProfile, {"name": name, **tree}
+    )
     if isinstance(found, list):
         raise UsageError("\n".join(f"{fault.key}: {fault.message}" for fault in found))
     try:

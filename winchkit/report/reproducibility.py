@@ -18,7 +18,7 @@ _FEW = 3
 
 
 @dataclass(frozen=True)
-class Command:
+class CommandLine:
     """Arguments of a command, from which it and further commands are written."""
 
     dataset: Dataset
@@ -74,7 +74,9 @@ class Command:
         return "".join(f" {_quoted(option)}" for option in self.options)
 
 
-def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[str, Any]) -> Markup:
+def repeat(
+    command: CommandLine, commands: Sequence[str], what: str, raw: Mapping[str, Any]
+) -> Markup:
     """The section on reproduction; ``what`` is the name of the result ``raw``."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("winchkit", "numpy", "scipy"))
     profile = element("code", command.profile)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from winchkit.diagnosis.compare import WinchCompared
-from winchkit.diagnosis.residuals.traces import Trace
+from winchkit.diagnosis.residuals.traces import OutputTrace
 from winchkit.dynamics.comparison import SimulatedError
 from winchkit.quantity_text import quantity
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import decimated
 from winchkit.report.words.columns import aligned, paragraph
 
@@ -39,7 +39,7 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
 
 def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError]) -> list[Figure]:
     """For each simulated motion the measured and the simulated one, above the predicted torque."""
-    traces = (t for t in compared.comparison.traces if isinstance(t, Trace))
+    traces = (t for t in compared.comparison.traces if isinstance(t, OutputTrace))
     torques = {t.run: t for t in traces if t.output in _TORQUES}
     found = []
     for e in errors:
@@ -47,24 +47,28 @@ def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError])
         time, name = e.time[kept], "position" if e.unit == "m" else "motor angle"
         panels = [
             Panel(
-                Axis(name, e.unit),
+                FigureAxis(name, e.unit),
                 (
-                    Series("measured", "measured", time, e.measured[kept]),
-                    Series("simulated", "with", time, e.simulated[kept]),
+                    FigureSeries("measured", "measured", time, e.measured[kept]),
+                    FigureSeries("simulated", "with", time, e.simulated[kept]),
                 ),
             ),
             Panel(
-                Axis("error of the simulation", e.unit, zero=True),
-                (Series("simulated − measured", "with", time, (e.simulated - e.measured)[kept]),),
+                FigureAxis("error of the simulation", e.unit, zero=True),
+                (
+                    FigureSeries(
+                        "simulated − measured", "with", time, (e.simulated - e.measured)[kept]
+                    ),
+                ),
             ),
         ]
         if (torque := torques.get(e.run)) is not None:
             panels.append(
                 Panel(
-                    Axis(torque.output.replace("_", " "), torque.unit),
+                    FigureAxis(torque.output.replace("_", " "), torque.unit),
                     (
-                        Series("measured", "measured", torque.time, torque.measured),
-                        Series("predicted", "today", torque.time, torque.predicted),
+                        FigureSeries("measured", "measured", torque.time, torque.measured),
+                        FigureSeries("predicted", "today", torque.time, torque.predicted),
                     ),
                 )
             )
@@ -73,7 +77,7 @@ def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError])
                 f"simulated-{e.run}-{e.driven_by}",
                 f"{e.run}: motion simulated from the {e.driven_by}",
                 f"Measured and simulated {name}: the error is {quantity(e.rms, e.unit)} rms.",
-                Axis("time", "s"),
+                FigureAxis("time", "s"),
                 tuple(panels),
             )
         )

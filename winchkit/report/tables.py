@@ -10,7 +10,7 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
 from winchkit.quantity_text import (
-    Scale,
+    PrintScale,
     grouped,
     quantity,
     scale_for,
@@ -38,7 +38,7 @@ _TOP = 10
 """Rows of a table that are open; the others are folded."""
 
 
-def output_scale(output: OutputFit) -> Scale:
+def output_scale(output: OutputFit) -> PrintScale:
     """One scale for all errors of an output."""
     return scale_for(output.heldout_rms_before, output.unit)
 
@@ -135,7 +135,9 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
     return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
 
 
-def bar(error: float, longest: float, noise: float | None, scale: Scale, tone: str = "") -> Markup:
+def bar(
+    error: float, longest: float, noise: float | None, scale: PrintScale, tone: str = ""
+) -> Markup:
     """A bar as a share of the longest, with a mark at the noise, and the value below.
 
     ``tone`` is a colour of the page, else the table's own.
@@ -190,7 +192,7 @@ def _times(share: float) -> str:
     return f"{significant(share, 2)} ×" if isfinite(share) else "–"
 
 
-def _candidate(candidate: CandidateScore, scales: Mapping[str, Scale]) -> list[str]:
+def _candidate(candidate: CandidateScore, scales: Mapping[str, PrintScale]) -> list[str]:
     errors = [
         significant(candidate.heldout_rms[name] / scale.worth)
         if name in candidate.heldout_rms

@@ -18,8 +18,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from winchkit.bench.tracker import Tracker
-    from winchkit.model.elastic import ElongationLaw, Exponential, Linear, Quartic
+    from winchkit.bench.tracker import TrackerReceiver
+    from winchkit.model.elastic import ElongationLaw, ExponentialLaw, LinearLaw, QuarticLaw
     from winchkit.model.rotation import angles_of, rotation_of
     from winchkit.robot.bench.computation import ComputationProcess
     from winchkit.robot.bench.platform import Platform
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
         steepest_force,
         wrench_feasibility,
     )
-    from winchkit.robot.geometry.forward import Found, forward
+    from winchkit.robot.geometry.forward import PosesFound, forward
     from winchkit.robot.geometry.kinematics import (
         Geometry,
         Pose,
@@ -74,36 +74,42 @@ if TYPE_CHECKING:
     from winchkit.robot.geometry.wrench import gravity_wrench
     from winchkit.robot.workspace.distances import Distances, distances
     from winchkit.robot.workspace.mesh import Mesh, mesh_of, write_mesh
-    from winchkit.robot.workspace.workspace import Demand, Grid, Workspace, grid_of, workspace_of
+    from winchkit.robot.workspace.workspace import (
+        CableDemand,
+        Grid,
+        Workspace,
+        grid_of,
+        workspace_of,
+    )
     from winchkit.schema.read import read_robot
     from winchkit.schema.robot_bench import BodySpec
 
 __all__ = [
     "PLAIN",
     "BodySpec",
+    "CableDemand",
     "ComputationProcess",
-    "Demand",
     "Distances",
     "DynamicTarget",
     "DynamicsCycle",
     "ElongationCorrection",
     "ElongationLaw",
-    "Exponential",
+    "ExponentialLaw",
     "Feasibility",
     "ForceLimits",
     "Forces",
-    "Found",
     "Geometry",
     "Grid",
     "InverseDynamics",
-    "Linear",
+    "LinearLaw",
     "Mesh",
     "Platform",
     "PlatformMotion",
     "Pose",
     "PosePlan",
     "PoseVolume",
-    "Quartic",
+    "PosesFound",
+    "QuarticLaw",
     "Rest",
     "Robot",
     "RobotAnswer",
@@ -111,7 +117,7 @@ __all__ = [
     "RobotKernels",
     "SelfCalibration",
     "Sensitivities",
-    "Tracker",
+    "TrackerReceiver",
     "Workspace",
     "angles_of",
     "approximate_forces",
@@ -159,8 +165,8 @@ __all__ = [
 ]
 
 _NAMES = {
-    "winchkit.bench.tracker": ("Tracker",),
-    "winchkit.model.elastic": ("ElongationLaw", "Exponential", "Linear", "Quartic"),
+    "winchkit.bench.tracker": ("TrackerReceiver",),
+    "winchkit.model.elastic": ("ElongationLaw", "ExponentialLaw", "LinearLaw", "QuarticLaw"),
     "winchkit.model.rotation": ("angles_of", "rotation_of"),
     "winchkit.robot.bench.computation": ("ComputationProcess",),
     "winchkit.robot.bench.platform": ("Platform",),
@@ -197,7 +203,7 @@ _NAMES = {
         "steepest_force",
         "wrench_feasibility",
     ),
-    "winchkit.robot.geometry.forward": ("Found", "forward"),
+    "winchkit.robot.geometry.forward": ("PosesFound", "forward"),
     "winchkit.robot.geometry.kinematics": (
         "Geometry",
         "Pose",
@@ -216,7 +222,7 @@ _NAMES = {
     "winchkit.robot.workspace.distances": ("Distances", "distances"),
     "winchkit.robot.workspace.mesh": ("Mesh", "mesh_of", "write_mesh"),
     "winchkit.robot.workspace.workspace": (
-        "Demand",
+        "CableDemand",
         "Grid",
         "Workspace",
         "grid_of",

@@ -14,7 +14,7 @@ WING = Wing(
         "live_robot": "winchkit.robot.web.live_robot:LiveRobot",
         "changes": "winchkit.robot.effects.reference:robot_changes",
         "simulated_profiles": "winchkit.robot.sim.build:profiles_of",
-        "simulated": "winchkit.robot.sim.live:LiveRobot",
+        "simulated": "winchkit.robot.sim.live:LivePlatform",
     },
     calls={
         "RobotProfile": {

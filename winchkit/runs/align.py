@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.runs.layout import Layout, Source
+from winchkit.runs.layout import Layout, SignalSource
 
 PATIENCE = 0.5
 """Longest wait of a row for a source that sends no samples, s."""
@@ -43,7 +43,7 @@ def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Ar
     return found
 
 
-def patience_of(source: Source) -> float:
+def patience_of(source: SignalSource) -> float:
     """Time without a sample after which a source counts as silent, s."""
     return max(PATIENCE, source.max_gap)
 
@@ -140,7 +140,7 @@ def _spaced(times: Array, period: float, last: float) -> Array:
     return np.array(kept)
 
 
-class Series:
+class SourceSeries:
     """Samples of one source, kept as long as the interpolation needs them."""
 
     def __init__(self, max_gap: float, width: int = 1) -> None:
@@ -188,7 +188,8 @@ class Aligner:
         self._opened = layout.rule.opened
         self._picked = Moments(layout)
         self._series = {
-            source.topic: Series(source.max_gap, len(_columns(source))) for source in layout.sources
+            source.topic: SourceSeries(source.max_gap, len(_columns(source)))
+            for source in layout.sources
         }
         self._used = {source.topic: _columns(source) for source in layout.sources}
         gap = next(item.max_gap for item in layout.sources if item.topic == layout.rule.topic)
@@ -235,6 +236,6 @@ class Aligner:
         return np.column_stack([moments - (self.start or 0.0), values])
 
 
-def _columns(source: Source) -> list[int]:
+def _columns(source: SignalSource) -> list[int]:
     """Indices of a source's signals that are columns of the run."""
     return [n for n, signal in enumerate(source.signals) if signal.column]

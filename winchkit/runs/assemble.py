@@ -22,7 +22,7 @@ _LATEST = 9.2e9
 
 
 @dataclass
-class Recording:
+class RawColumns:
     """A file's columns before conversion; ``line_of`` gives the line of a row."""
 
     path: str
@@ -56,7 +56,7 @@ def refuse(faults: Sequence[Fault]) -> None:
     raise RunError(shown)
 
 
-def assemble(recording: Recording) -> Run:
+def assemble(recording: RawColumns) -> Run:
     """Convert and check a recording; raises RunError with every fault of it."""
     names = [name for name, _ in recording.header]
     early = [*_header_faults(recording, names), *_metadata_faults(recording), *recording.faults]
@@ -83,7 +83,7 @@ def assemble(recording: Recording) -> Run:
     return Run(Path(path).stem, time.values, channels, metadata, path, tuple(notes))
 
 
-def _header_faults(recording: Recording, names: list[str]) -> Iterator[Fault]:
+def _header_faults(recording: RawColumns, names: list[str]) -> Iterator[Fault]:
     path, line = recording.path, recording.header_line
     for name in dict.fromkeys(names):
         if names.count(name) > 1:
@@ -113,13 +113,13 @@ def _is_poses(names: list[str]) -> bool:
     return any(name in POSE_DIMENSIONS or name.endswith(".motor_angle") for name in names)
 
 
-def _missing(column: str, names: list[str], recording: Recording) -> Fault:
+def _missing(column: str, names: list[str], recording: RawColumns) -> Fault:
     known = f"; it has {', '.join(names)}" if names else ""
     message = f"there is no column '{column}'{known}" + suggest(column.split(maxsplit=1)[0], names)
     return Fault(message, recording.path, recording.header_line)
 
 
-def _metadata_faults(recording: Recording) -> Iterator[Fault]:
+def _metadata_faults(recording: RawColumns) -> Iterator[Fault]:
     metadata = recording.metadata
     reasons = {}
     if "load_mass" in metadata:
@@ -153,13 +153,13 @@ def _channel(name: str, unit: str, values: Array, number: int) -> Channel:
     return Channel(values, next(iter(UNITS[dimension])), number)
 
 
-def _infinite(recording: Recording, name: str, values: Array) -> Iterator[Fault]:
+def _infinite(recording: RawColumns, name: str, values: Array) -> Iterator[Fault]:
     for row in np.flatnonzero(np.isinf(values)):
         message = f"column '{name}' is infinite; leave the cell empty where there is no value"
         yield Fault(message, recording.path, recording.line_of(int(row)))
 
 
-def _time_faults(recording: Recording, time: Array) -> Iterator[Fault]:
+def _time_faults(recording: RawColumns, time: Array) -> Iterator[Fault]:
     """Every sample has a time, later than the one before it."""
     for row in np.flatnonzero(np.isnan(time)):
         yield Fault("time is missing here", recording.path, recording.line_of(int(row)))

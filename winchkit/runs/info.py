@@ -12,7 +12,7 @@ import numpy as np
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.runs.align import MAY_LACK, PATIENCE
-from winchkit.runs.layout import Samples, Source
+from winchkit.runs.layout import SignalSource, SourceSamples
 from winchkit.runs.log import Log, Note
 from winchkit.runs.run import Run, lost_samples
 
@@ -125,7 +125,9 @@ def _changes(
                 yield f"{name}{since}: {text}"
 
 
-def _source_info(source: Source, samples: Samples, span: tuple[float, float]) -> SourceInfo:
+def _source_info(
+    source: SignalSource, samples: SourceSamples, span: tuple[float, float]
+) -> SourceInfo:
     times = np.unique(samples.times)
     steps = np.diff(times)
     # Samples that an adapter has buffered arrive in bursts: their median interval is not the rate.

@@ -17,7 +17,7 @@ _LARGEST = 1 << 62
 
 
 @dataclass(frozen=True)
-class Signal:
+class SourceSignal:
     """One number of a source."""
 
     name: str
@@ -27,12 +27,12 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Source:
+class SignalSource:
     """A drive or an instrument: signals that are sampled together."""
 
     topic: str
     """``/A/drive``, ``/A/cell``."""
-    signals: tuple[Signal, ...]
+    signals: tuple[SourceSignal, ...]
     max_gap: float
     """Longest interval over which samples are interpolated, s."""
 
@@ -56,7 +56,7 @@ class RowRule:
 class Layout:
     """Sources in the order of their columns, and the rule for rows."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[SignalSource, ...]
     rule: RowRule
     clock_offset: int = 0
     """UTC less the bench's clock, ns."""
@@ -68,7 +68,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Samples:
+class SourceSamples:
     """Samples of one source, in order of arrival."""
 
     times: Array
@@ -82,11 +82,11 @@ class Samples:
         return len(self.times)
 
     @staticmethod
-    def joined(pieces: Sequence[Samples], signals: int) -> Samples:
+    def joined(pieces: Sequence[SourceSamples], signals: int) -> SourceSamples:
         """Concatenated pieces."""
         if not pieces:
-            return Samples(np.empty(0), np.empty(0), np.empty((0, signals)))
-        return Samples(
+            return SourceSamples(np.empty(0), np.empty(0), np.empty((0, signals)))
+        return SourceSamples(
             np.concatenate([item.times for item in pieces]),
             np.concatenate([item.received for item in pieces]),
             np.concatenate([item.values for item in pieces]),
@@ -118,10 +118,10 @@ def read_layout(text: str, path: str) -> Layout:
 
 def _layout(found: dict[str, Any]) -> Layout:
     sources = tuple(
-        Source(
+        SignalSource(
             str(item["topic"]),
             tuple(
-                Signal(str(signal["name"]), str(signal["unit"]), str(signal["column"]))
+                SourceSignal(str(signal["name"]), str(signal["unit"]), str(signal["column"]))
                 for signal in item["signals"]
             ),
             float(item["max_gap"]),

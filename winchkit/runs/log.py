@@ -10,8 +10,8 @@ import numpy as np
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.align import Aligner
-from winchkit.runs.assemble import Recording, assemble
-from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.assemble import RawColumns, assemble
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 from winchkit.runs.run import Run
 
 _BRIDGED = 1.5
@@ -53,7 +53,7 @@ class Log:
 
     path: str
     layout: Layout
-    samples: Mapping[str, Samples]
+    samples: Mapping[str, SourceSamples]
     """By topic."""
     metadata: Mapping[str, str] = field(default_factory=dict)
     events: tuple[Note, ...] = ()
@@ -79,7 +79,7 @@ def aligned(log: Log) -> Run:
     for topic, samples in log.samples.items():
         aligner.add(topic, samples.times, samples.values)
     table = aligner.rows(log.span[1], ends=True)
-    recording = Recording(
+    recording = RawColumns(
         log.path,
         log.layout.columns(),
         list(table.T.copy()),
@@ -93,14 +93,14 @@ def aligned(log: Log) -> Run:
 def log_of_run(run: Run, closed: bool | None = True) -> Log:
     """A run as a log of one source, whose rows are its samples."""
     signals = tuple(
-        Signal(name.replace(".", "_"), item.unit, name) for name, item in run.channels.items()
+        SourceSignal(name.replace(".", "_"), item.unit, name) for name, item in run.channels.items()
     )
     gap = _BRIDGED * run.interval if len(run) > 1 else 0.0
-    source = Source("/run", signals, gap)
+    source = SignalSource("/run", signals, gap)
     values = [item.values for item in run.channels.values()]
     table = np.column_stack(values) if values else np.empty((len(run), 0))
     rule = RowRule("/run", float("-inf"), start=0.0)
-    samples = {"/run": Samples(run.time, run.time, table)}
+    samples = {"/run": SourceSamples(run.time, run.time, table)}
     return Log(
         run.path, Layout((source,), rule), samples, run.metadata, closed=closed, notes=run.notes
     )
@@ -114,7 +114,7 @@ def joined(logs: Sequence[Log]) -> Log:
             message = f"is not a part of the same log as {first.path}"
             raise RunError(Fault(message, other.path))
     samples = {
-        source.topic: Samples.joined(
+        source.topic: SourceSamples.joined(
             [log.samples[source.topic] for log in logs], len(source.signals)
         )
         for source in first.layout.sources

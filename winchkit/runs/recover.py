@@ -18,11 +18,11 @@ from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, PROFILE, McapFile
 from winchkit.runs.formats.mcap_read import read_content
 from winchkit.runs.formats.mcap_records import (
     MARK,
-    Body,
     Damage,
-    Messages,
+    McapRecord,
+    MessageBlock,
     Op,
-    Record,
+    RecordBody,
     is_intact,
     joint_after,
     next_chunk,
@@ -147,7 +147,7 @@ def _mcap(data: bytes) -> tuple[bytes, Recovered]:
     for item in _whole(data):
         damaged += item.offset > max(end, len(MARK))
         end = item.end
-        if isinstance(item, Messages):
+        if isinstance(item, MessageBlock):
             file.put_messages(item, data[item.offset : item.end])
             kept += len(item.log_times)
         elif item.op in _COPIED:
@@ -161,7 +161,9 @@ def _mcap(data: bytes) -> tuple[bytes, Recovered]:
                 damaged += 1
             else:
                 file.put_chunk(content)
-                kept += sum(len(m.log_times) for m in records(content) if isinstance(m, Messages))
+                kept += sum(
+                    len(m.log_times) for m in records(content) if isinstance(m, MessageBlock)
+                )
         elif item.op == Op.DATA_END:
             closed, intact = True, is_intact(item, data)
             break
@@ -177,7 +179,7 @@ def _samples(saved: bytes) -> int:
     return sum(content.count(topic) for topic in content.messages if topic not in _NO_SAMPLES)
 
 
-def _whole(data: bytes) -> Iterator[Record | Messages]:
+def _whole(data: bytes) -> Iterator[McapRecord | MessageBlock]:
     """All complete records; after damage the search continues at the next complete chunk."""
     at = len(MARK)
     while at < len(data):
@@ -185,16 +187,16 @@ def _whole(data: bytes) -> Iterator[Record | Messages]:
             for item in records(data, at):
                 yield item
                 at = item.end
-                if isinstance(item, Record) and item.op == Op.DATA_END:
+                if isinstance(item, McapRecord) and item.op == Op.DATA_END:
                     return
         except Damage:
             pass
         at = next_chunk(data, at + 1)
 
 
-def _is_readable(item: Record) -> bool:
+def _is_readable(item: McapRecord) -> bool:
     """Whether a declaration or metadata can be read."""
-    fields = Body(item.body)
+    fields = RecordBody(item.body)
     try:
         if item.op == Op.METADATA:
             fields.text()

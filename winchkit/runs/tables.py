@@ -10,7 +10,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError, suggest
-from winchkit.runs.assemble import Recording, assemble
+from winchkit.runs.assemble import RawColumns, assemble
 from winchkit.runs.columns import header_of
 from winchkit.runs.run import Run
 from winchkit.tabular import arrow_of
@@ -73,7 +73,7 @@ def run_of(
     named = name or texts.pop(_NAME, "") or "table"
     texts.pop(_NAME, None)
     columns = [_numbers(column) for column in found.columns]
-    recording = Recording(
+    recording = RawColumns(
         named, header, columns, _no_line, metadata={**texts, **dict(metadata or {})}
     )
     return replace(assemble(recording), name=named, path="")

@@ -24,7 +24,7 @@ LoadDirection = Literal["tension", "compression"]
 
 
 @dataclass(frozen=True)
-class Reading(Marker):
+class PointReading(Marker):
     """Marks a reading: a force with its unit, or a number in a unit of its own (counts, mV/V)."""
 
     @property
@@ -44,9 +44,9 @@ class CalibrationPoint(Table):
     """One applied load and the device's reading."""
 
     load: Force
-    indicated: Annotated[float, Reading()]
+    indicated: Annotated[float, PointReading()]
     """Mean of the device's gross value, in the unit of the calibration."""
-    std: Annotated[float, Reading()] = 0.0
+    std: Annotated[float, PointReading()] = 0.0
     """Standard deviation of that mean."""
     going: Literal["up", "down"] = "up"
     """Direction of loading: ``up`` after a smaller load, ``down`` after a larger one."""

@@ -30,7 +30,7 @@ STEP_ACTIONS = ("to", "by", "hold", "ask")
 
 
 @dataclass(frozen=True)
-class Step(Table):
+class ProgrammeStep(Table):
     """One step: exactly one of ``to``, ``by``, ``hold`` and ``ask`` is given."""
 
     winch: str = ALL
@@ -93,7 +93,7 @@ class Programme(Table):
     """A motion programme; the whole list of steps runs ``repeat`` times."""
 
     name: str
-    step: tuple[Step, ...]
+    step: tuple[ProgrammeStep, ...]
     repeat: Annotated[int, Whole(1, 1_000_000)] = 1
     description: str = ""
 

@@ -29,7 +29,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.schema.reading import bench as benches
 from winchkit.schema.reading.lines import Key
-from winchkit.schema.reading.parts import Reading
+from winchkit.schema.reading.parts import FileReading
 from winchkit.schema.reading.source import open_source
 from winchkit.schema.robot_programme import RobotProgramme
 from winchkit.schema.simbench import SimBench
@@ -48,7 +48,7 @@ Declared = (
     | ImportMapping
 )
 T = TypeVar("T")
-Reader = Callable[[Reading, dict[str, Any]], Declared | None]
+Reader = Callable[[FileReading, dict[str, Any]], Declared | None]
 PathLike = str | Path
 
 
@@ -245,7 +245,7 @@ def read_any(path: PathLike) -> Declared:
 
 def load(path: PathLike, kind: str | None = None) -> Declaration:
     """Read a declaration with its warnings; ``kind``, if given, is required."""
-    reading = Reading(open_source(path))
+    reading = FileReading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:
         without = ", which has no drum and no cable" if found == "axis" else ""
@@ -274,24 +274,24 @@ def _read(path: PathLike, kind: str, expected: type[T]) -> T:
 
 def _table(
     kind: type[T], *, with_path: bool = False
-) -> Callable[[Reading, dict[str, Any]], T | None]:
+) -> Callable[[FileReading, dict[str, Any]], T | None]:
     """Reader of a file of one table, with the file's name where it gives itself none."""
 
-    def read(reading: Reading, tree: dict[str, Any]) -> T | None:
+    def read(reading: FileReading, tree: dict[str, Any]) -> T | None:
         named = {"name": reading.stem, **tree}
         return reading.table(kind, _with_path(reading, named) if with_path else named)
 
     return read
 
 
-def _with_path(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+def _with_path(reading: FileReading, tree: dict[str, Any]) -> dict[str, Any]:
     """A tree with the path of its file."""
     if "path" in tree:
         reading.fault(("path",), "unknown key")
     return {**tree, "path": reading.source.path}
 
 
-def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
+def _device(reading: FileReading, tree: dict[str, Any]) -> DeviceSpec | None:
     if isinstance(modbus := tree.get("modbus"), Mapping):
         tree = {**tree, "modbus": with_addresses(modbus, reading.fault)}
     device = reading.table(DeviceSpec, _with_path(reading, tree))
@@ -307,7 +307,7 @@ def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
 
 _READERS: dict[str, Reader] = {
     "winch": lambda reading, tree: reading.winch(tree, reading.stem),
-    "axis": Reading.axis,
+    "axis": FileReading.axis,
     "bench": lambda reading, tree: benches.bench(reading, tree, read_device, read_robot),
     "programme": _table(Programme),
     "sim-bench": lambda reading, tree: benches.sim_bench(reading, tree, read_device, read_robot),
@@ -319,7 +319,7 @@ _READERS: dict[str, Reader] = {
 }
 
 
-def _warnings(reading: Reading, value: Declared) -> tuple[Fault, ...]:
+def _warnings(reading: FileReading, value: Declared) -> tuple[Fault, ...]:
     if isinstance(value, WinchProfile):
         return _guide_warnings(reading, value, ())
     if isinstance(value, RobotProfile):
@@ -341,7 +341,7 @@ def _warnings(reading: Reading, value: Declared) -> tuple[Fault, ...]:
     return ()
 
 
-def _guide_warnings(reading: Reading, winch: WinchProfile, at: Key) -> tuple[Fault, ...]:
+def _guide_warnings(reading: FileReading, winch: WinchProfile, at: Key) -> tuple[Fault, ...]:
     guide, pitch = winch.guide, winch.drum.groove_pitch
     if guide is None or pitch is None:
         return ()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
 
@@ -76,25 +76,46 @@ def demo_names() -> list[str]:
     return [name for name in names("sim") if name.startswith(_DEMO)]
 
 
-def listed_benches() -> list[dict[str, object]]:
+@dataclass(frozen=True)
+class ListedEffect:
+    """A hidden effect of a simulated bench."""
+
+    physics: str
+    answers: tuple[str, ...]
+    """Effects of the catalogue that describe it."""
+
+
+@dataclass(frozen=True)
+class ListedBench:
+    """A shipped simulated bench."""
+
+    name: str
+    """As ``simulate`` and ``--sim`` take it."""
+    description: str
+    """One line."""
+    hidden: Mapping[str, tuple[ListedEffect, ...]]
+    """By winch."""
+
+
+def listed_benches() -> list[ListedBench]:
     """List the shipped simulated benches.
 
     Returns
     -------
-    list of dict
-        Name, description, and hidden effects.
+    list of ListedBench
+        By name.
     """
     from winchkit.schema.read import load
 
-    rows: list[dict[str, object]] = []
+    rows = []
     for name in names("sim"):
         value = load(find("sim", name)).value
         if isinstance(value, SimBench):
             hidden = {
-                winch: [{"physics": spec.physics, "answers": spec.answers} for spec in truth.hidden]
+                winch: tuple(ListedEffect(spec.physics, spec.answers) for spec in truth.hidden)
                 for winch, truth in value.truth.items()
             }
-            rows.append({"name": name, "description": value.description, "hidden": hidden})
+            rows.append(ListedBench(name, value.description, hidden))
     return rows
 
 

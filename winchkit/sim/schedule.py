@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from winchkit.errors import Fault, FileError, suggest
 from winchkit.schema.bench import LimitSpec
-from winchkit.schema.programme import ALL, Programme, Step
+from winchkit.schema.programme import ALL, Programme, ProgrammeStep
 from winchkit.sim.plant.trajectory import SCurve, plan
 
 _JERK_TIME = 0.4
@@ -50,7 +50,7 @@ class RunPlan:
         return sum(leg.duration for leg in self.legs)
 
 
-class _Layout:
+class _StepTimes:
     """Evaluates the steps with the resulting lengths, loads and times."""
 
     def __init__(
@@ -84,7 +84,7 @@ class _Layout:
             self.elapsed += run.duration
         self._begin()
 
-    def take(self, step: Step, winches: Sequence[str]) -> None:
+    def take(self, step: ProgrammeStep, winches: Sequence[str]) -> None:
         """Schedule one step for the winches that it names."""
         if step.load_mass is not None and any(
             self.load[name] != step.load_mass for name in winches
@@ -104,7 +104,7 @@ class _Layout:
         else:
             self._move(step, winches)
 
-    def _move(self, step: Step, winches: Sequence[str]) -> None:
+    def _move(self, step: ProgrammeStep, winches: Sequence[str]) -> None:
         moves = {}
         for name in winches:
             here, limit = self.length[name], self.limits[name]
@@ -132,12 +132,12 @@ def schedule(
     without motion and hold.
     """
     _check_names(programme, list(limits))
-    layout = _Layout(limits, dict(length), dict(load_mass))
+    layout = _StepTimes(limits, dict(length), dict(load_mass))
     for index, step in enumerate(programme.step):
         layout.take(step, _winches(step, limits))
         _check_place(programme, index, layout)
     fixed = any(step.to is not None for step in programme.step)
-    layout = _Layout(limits, layout.length if fixed else dict(length), dict(load_mass))
+    layout = _StepTimes(limits, layout.length if fixed else dict(length), dict(load_mass))
     for _ in range(programme.repeat):
         for step in programme.step:
             layout.take(step, _winches(step, limits))
@@ -147,7 +147,7 @@ def schedule(
     return layout.plans
 
 
-def _winches(step: Step, limits: Mapping[str, LimitSpec]) -> list[str]:
+def _winches(step: ProgrammeStep, limits: Mapping[str, LimitSpec]) -> list[str]:
     return list(limits) if step.winch == ALL else [step.winch]
 
 
@@ -166,7 +166,7 @@ def _check_names(programme: Programme, known: list[str]) -> None:
         raise FileError(faults)
 
 
-def _check_place(programme: Programme, index: int, layout: _Layout) -> None:
+def _check_place(programme: Programme, index: int, layout: _StepTimes) -> None:
     for name, limit in layout.limits.items():
         here = layout.length[name]
         if limit.length is not None and not limit.length[0] <= here <= limit.length[1]:

@@ -15,7 +15,7 @@ _EMCY, _SDO_REPLY, _SDO_REQUEST, _HEARTBEAT = 0x080, 0x580, 0x600, 0x700
 
 
 @dataclass(frozen=True)
-class Frame:
+class CarriedFrame:
     """One frame as it was carried, or lost."""
 
     time: float
@@ -81,14 +81,14 @@ class FrameNames:
             if what in (name, name.rstrip("0123456789"), name.partition(".")[0])
         )
 
-    def frame(self, carried: Carried) -> Frame:
+    def frame(self, carried: Carried) -> CarriedFrame:
         """Read a frame."""
         said = decode(carried.identifier, carried.data, self._nodes)
         values = {name: int(value) for name, value in said.values.items()}
         if said.kind == "EMCY":
             emergency = parse_emergency(carried.data, carried.time)
             values |= {} if emergency is None else {"code": emergency.code}
-        return Frame(
+        return CarriedFrame(
             carried.time,
             carried.identifier,
             carried.data,

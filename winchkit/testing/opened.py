@@ -15,8 +15,8 @@ from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
-from winchkit.testing.frames import Frame
-from winchkit.testing.recording import Recording
+from winchkit.testing.frames import CarriedFrame
+from winchkit.testing.recording import WireRecording
 
 _POLL = 2e-3
 """s: half a cycle of the usual 4 ms."""
@@ -53,7 +53,7 @@ class OpenedBench:
             live = _live(self.clock, declared, seed, hidden)
             self.live = stack.enter_context(live)
             self.spec: BenchSpec = live.bench_spec
-            self._recording = Recording(self.spec, live.wire)
+            self._recording = WireRecording(self.spec, live.wire)
             self.bench: Bench = stack.enter_context(open_bench(self.spec, self.clock))
             if isinstance(self.clock, PacedClock):
                 self.bench.on_cycle(self.clock.control)
@@ -79,7 +79,7 @@ class OpenedBench:
     # What goes wrong.
 
     def drop(self, frames: str | int, *, share: float = 1.0) -> Callable[[], None]:
-        """Lose a share of some frames on their way, ``drop("A.tpdo1")``; see ``Frame.name``.
+        """Lose a share of some frames on their way, ``drop("A.tpdo1")``; see ``CarriedFrame.name``.
 
         A winch's name stands for everything from and to its drive, ``host`` for all that the
         host sends, a number for an identifier. Returns a function that ends it.
@@ -160,11 +160,11 @@ class OpenedBench:
         self._start = {winch: self.length(winch) for winch in self.live.winches}
 
     @property
-    def frames(self) -> list[Frame]:
+    def frames(self) -> list[CarriedFrame]:
         """Frames so far in their order, those of the opening included; the last 200 000."""
         return self._recording.frames()
 
-    def frames_of(self, name: str | int, since: float = 0.0) -> list[Frame]:
+    def frames_of(self, name: str | int, since: float = 0.0) -> list[CarriedFrame]:
         """Frames by name, e.g. ``A.rpdo1``, from a time on; raises UsageError for none such."""
         return self._recording.frames(name, since)
 

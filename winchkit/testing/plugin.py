@@ -15,10 +15,10 @@ import pytest
 if TYPE_CHECKING:
     from winchkit.testing.opened import OpenedBench
 
-__all__ = ["SimBench", "sim_bench"]
+__all__ = ["SimBenchFixture", "sim_bench"]
 
 
-class SimBench:
+class SimBenchFixture:
     """Value of the fixture ``sim_bench``: call it to open a simulated bench."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
@@ -52,10 +52,10 @@ class SimBench:
 
 
 @pytest.fixture
-def sim_bench(tmp_path: Path) -> Iterator[SimBench]:
+def sim_bench(tmp_path: Path) -> Iterator[SimBenchFixture]:
     """Open simulated benches: ``sim = sim_bench("spiral-bench")``, then ``sim.bench``.
 
     Whatever a test leaves open is stopped and closed after it.
     """
     with ExitStack() as stack:
-        yield SimBench(stack, tmp_path)
+        yield SimBenchFixture(stack, tmp_path)

@@ -9,17 +9,17 @@ from winchkit.catalog import find
 from winchkit.errors import UsageError, suggest
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.live.buses import Carried, Wire
-from winchkit.testing.frames import Frame, FrameNames
+from winchkit.sim.live.buses import BusWire, Carried
+from winchkit.testing.frames import CarriedFrame, FrameNames
 
 _KEPT = 200_000
 """Frames: half a minute of a full bus at 1 Mbit/s (7700 frames of eight bytes a second)."""
 
 
-class Recording:
+class WireRecording:
     """Listens to every wire of a bench from now on."""
 
-    def __init__(self, spec: BenchSpec, wires: Mapping[str, Wire]) -> None:
+    def __init__(self, spec: BenchSpec, wires: Mapping[str, BusWire]) -> None:
         self._names = {bus: FrameNames(spec.bus[bus].node) for bus in wires}
         self._carried: deque[tuple[str, Carried]] = deque(maxlen=_KEPT)
         for name, wiring in spec.winch.items():
@@ -39,7 +39,7 @@ class Recording:
             raise UsageError(f"no frame is named '{what}'; there are {', '.join(known)}{near}")
         return found
 
-    def frames(self, what: str | int | None = None, since: float = 0.0) -> list[Frame]:
+    def frames(self, what: str | int | None = None, since: float = 0.0) -> list[CarriedFrame]:
         """Frames in their order, by name where one is given, from a time (s) on."""
         wanted = None if what is None else self.identifiers(what)
         return [

@@ -26,7 +26,7 @@ from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
 from winchkit.web.views import View, attachment
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 if TYPE_CHECKING:
     from winchkit.web.bench.view import BenchView
@@ -41,7 +41,7 @@ _LARGEST_MESSAGE = 64_000
 
 
 def application(
-    workspace: Workspace,
+    workspace: DiagnoseView,
     token: str,
     views: Sequence[View] = (),
     bench: BenchView | None = None,
@@ -102,7 +102,7 @@ class _Listeners:
 class _Work:
     """Routes that change the workspace, and its view."""
 
-    def __init__(self, workspace: Workspace, views: Sequence[View], *, has_bench: bool) -> None:
+    def __init__(self, workspace: DiagnoseView, views: Sequence[View], *, has_bench: bool) -> None:
         self.workspace = workspace
         self.views = views
         self.has_bench = has_bench
@@ -226,7 +226,7 @@ class _Work:
 class _Drawings:
     """Routes that read or write files: curves, cards, plans, an effect of the user's."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: DiagnoseView) -> None:
         self.workspace = workspace
 
     def routes(self) -> list[Route]:
@@ -300,7 +300,7 @@ async def _object(request: Request) -> dict[str, Any]:
     return asked
 
 
-async def _refused(workspace: Workspace, request: Request, error: Exception) -> Response:
+async def _refused(workspace: DiagnoseView, request: Request, error: Exception) -> Response:
     return JSONResponse({"error": workspace.words(str(error))}, 400)
 
 

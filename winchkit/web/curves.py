@@ -28,7 +28,7 @@ from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.model.stages import RESULT_UNITS
 from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
-from winchkit.quantity_text import Scale, scale_for
+from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
@@ -73,7 +73,7 @@ class OutputCurves:
     """Whether there is a prediction; without one it and the residual are NaN."""
 
     @property
-    def scale(self) -> Scale:
+    def scale(self) -> PrintScale:
         """Unit of the residual."""
         return scale_for(3 * self.sizes[1], RESULT_UNITS[self.output])
 

@@ -19,7 +19,7 @@ _PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 
 
 @dataclass(frozen=True)
-class Simulated:
+class ExampleRuns:
     """Runs of a simulated bench, its nominal profile, and what it hides in words."""
 
     bench: SimBench
@@ -54,14 +54,14 @@ class Simulated:
             yield from simulate(self.bench, profiles, programme, seed=self.seed)
 
 
-def example_runs(name: str) -> Simulated:
+def example_runs(name: str) -> ExampleRuns:
     """An example of the catalogue; raises UsageError for a bench with several winches."""
     bench = read_simbench(find("sim", name))
     if len(bench.bench.winch) != 1:
         raise UsageError(f"'{name}' has {len(bench.bench.winch)} winches; choose one with one")
-    return Simulated(bench, seed=1)
+    return ExampleRuns(bench, seed=1)
 
 
-def mystery_runs(seed: int) -> Simulated:
+def mystery_runs(seed: int) -> ExampleRuns:
     """The simulated bench of a seed, which determines its hidden effect."""
-    return Simulated(choose_bench(seed), seed)
+    return ExampleRuns(choose_bench(seed), seed)

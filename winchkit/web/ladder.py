@@ -11,7 +11,7 @@ from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
-from winchkit.quantity_text import Scale, between, scale_for, significant, with_std
+from winchkit.quantity_text import PrintScale, between, scale_for, significant, with_std
 from winchkit.report.detectability import useful_candidates
 from winchkit.report.words.sentence import (
     capital,
@@ -47,7 +47,7 @@ VERDICT_WORDS = {
 
 
 @dataclass(frozen=True)
-class Rung:
+class ModelErrors:
     """A model of the page's history with its held-out errors, SI."""
 
     label: str
@@ -110,7 +110,7 @@ def refitted(said: str) -> dict[str, Any]:
 
 
 def ladder(
-    answer: WinchAnswer, history: Sequence[Rung], beside: Diagnosis | None = None
+    answer: WinchAnswer, history: Sequence[ModelErrors], beside: Diagnosis | None = None
 ) -> dict[str, Any]:
     """Rows and columns of the ladder.
 
@@ -231,7 +231,7 @@ def _focus(diagnosis: Diagnosis) -> str:
     return max(changed or diagnosis.outputs, key=ratio)
 
 
-def _cell(value: float | None, floor: float | None, scale: Scale) -> dict[str, Any] | None:
+def _cell(value: float | None, floor: float | None, scale: PrintScale) -> dict[str, Any] | None:
     if value is None or not isfinite(value):
         return None
     return {

@@ -16,7 +16,7 @@ from winchkit.errors import UsageError
 from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name
 from winchkit.web.curves import curves_of
-from winchkit.web.ladder import Rung
+from winchkit.web.ladder import ModelErrors
 from winchkit.web.state import PageState, Version
 
 
@@ -52,7 +52,7 @@ def refit(
     return replace(
         state,
         versions=(*state.versions, Version(path, effect)),
-        rungs=(*state.rungs, Rung(label, before)),
+        rungs=(*state.rungs, ModelErrors(label, before)),
         said=_said(outputs),
         answer=WinchAnswer(answer.engine, answer.result, shown),
         refitted=True,

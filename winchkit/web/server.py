@@ -78,13 +78,13 @@ def serve(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
     from winchkit.web.views import views_of
-    from winchkit.web.workspace import Workspace
+    from winchkit.web.workspace import DiagnoseView
 
     token = secrets.token_urlsafe(24)
     with ExitStack() as stack:
         own_folder = TemporaryDirectory(prefix="winchkit-page-", ignore_cleanup_errors=True)
         own = Path(stack.enter_context(own_folder))
-        workspace = Workspace(own, effects, work=folder)
+        workspace = DiagnoseView(own, effects, work=folder)
         stack.callback(workspace.close)
         view = None
         if bench is not None or sim is not None:

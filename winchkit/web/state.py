@@ -18,7 +18,7 @@ from winchkit.profile_edit.naming import extended_name
 from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
-from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
+from winchkit.web.ladder import VERDICT_WORDS, ModelErrors, ladder, refitted, verdict
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class PageState:
     the memory that an answer holds."""
     refitted: bool = False
     """Whether an addition is fitted and shown, and its diagnosis under way."""
-    rungs: tuple[Rung, ...] = ()
+    rungs: tuple[ModelErrors, ...] = ()
     """Errors of the profiles before the present one."""
     said: str = ""
     """What the last addition changed, for the live region."""

@@ -11,7 +11,7 @@ from starlette.routing import Route
 
 from winchkit import wings
 from winchkit.errors import UsageError
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 Order = Callable[[Mapping[str, Any]], object]
 """Does what a request of the page orders."""
@@ -26,7 +26,7 @@ class View:
     name = ""
     """First part of its address on the page; files that are dropped there name it."""
 
-    def __init__(self, workspace: Workspace, folder: Path) -> None:
+    def __init__(self, workspace: DiagnoseView, folder: Path) -> None:
         self.workspace = workspace
         self.folder = folder
 
@@ -55,7 +55,7 @@ class View:
         raise UsageError(f"the view '{self.name}' opens no files")
 
 
-def views_of(workspace: Workspace, folder: Path) -> list[View]:
+def views_of(workspace: DiagnoseView, folder: Path) -> list[View]:
     """Views of all wings."""
     return [
         wings.imported(place)(workspace, folder) for wing in wings.own() for place in wing.views

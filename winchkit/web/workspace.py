@@ -37,7 +37,7 @@ from winchkit.schema.programme import write_programme
 from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
-from winchkit.web.examples import Simulated, example_runs, mystery_runs
+from winchkit.web.examples import ExampleRuns, example_runs, mystery_runs
 from winchkit.web.foreign import import_command, imported
 from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
@@ -69,7 +69,7 @@ class Cancelled(Exception):
 
 
 @dataclass
-class _Work:
+class _ViewWork:
     what: str = ""
     share: float = 0.0
     cancelled: threading.Event = field(default_factory=threading.Event)
@@ -86,7 +86,7 @@ class StoredRun(Protocol):
         """Read it; raises FileError."""
 
 
-class Workspace:
+class DiagnoseView:
     """State of the Diagnose view and the one thread that changes it.
 
     ``folder``: of the server's own. ``changed``: called, from the working thread, whenever there is
@@ -106,7 +106,7 @@ class Workspace:
         self.changed = changed
         self.catalogue: Catalogue = load_catalogue(effects)
         self._state = PageState()
-        self._work: _Work | None = None
+        self._work: _ViewWork | None = None
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
         self._prepared: Dataset | None = None
@@ -332,7 +332,7 @@ class Workspace:
         return self._pool.submit(self._run, what, call)
 
     def _run(self, what: str, call: Callable[[], None]) -> None:
-        self._work = _Work(what)
+        self._work = _ViewWork(what)
         self.changed()
         try:
             call()
@@ -427,7 +427,7 @@ class Workspace:
         self._set(source=named, made=made, versions=(Version(copy),), rungs=())
         self._set(answer=None, curves={})
 
-    def _simulate(self, simulated: Simulated, folder: Path, place: str, origin: str) -> None:
+    def _simulate(self, simulated: ExampleRuns, folder: Path, place: str, origin: str) -> None:
         runs = []
         for run in simulated.runs:
             path = folder / f"{run.name}.csv"

@@ -18,13 +18,15 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.commissioning import record
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.procedure import commission_bench
-from winchkit.bench.commissioning.record import Record
+from winchkit.bench.commissioning.record import CommissioningRecord
 from winchkit.bench.remote.server import StationServer
 from winchkit.cli.bench.commission import command
 from winchkit.errors import NotPermitted, UsageError
 
 
-def commissioned(bench: SlaveBench, say: Callable[[str], None] = lambda _text: None) -> Record:
+def commissioned(
+    bench: SlaveBench, say: Callable[[str], None] = lambda _text: None
+) -> CommissioningRecord:
     return commission_bench(bench.spec, AnswerFile(bench.answers, say), bench.clock)
 
 

@@ -13,10 +13,10 @@ import pytest
 from slave_bench import write_bench
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.record import (
+    CommissioningRecord,
     Confirmation,
     DriveRecord,
     HostLossRecord,
-    Record,
     WinchRecord,
     hash_of,
     is_simulated,
@@ -45,7 +45,9 @@ def spec(tmp_path: Path) -> BenchSpec:
         stops_on_nmt=True,
         confirmed=done,
     )
-    record = Record("slave-bench", "now", "me", "typed", {}, hash_of(spec.path), {"A": winch})
+    record = CommissioningRecord(
+        "slave-bench", "now", "me", "typed", {}, hash_of(spec.path), {"A": winch}
+    )
     write_record(record, spec.record_file)
     return spec
 

@@ -12,8 +12,8 @@ from winchkit.bench.control.conditions import CONDITIONS, Condition
 from winchkit.bench.control.observation import (
     FACTS,
     Instrumented,
-    Memory,
     Supervised,
+    SupervisorMemory,
     WinchInput,
 )
 from winchkit.bench.control.supervisor import Supervisor
@@ -85,7 +85,7 @@ class _Told:
 )
 def test_a_condition_on_facts_asks_for_nothing_else(row: Condition) -> None:
     told = _Told(GOOD._replace(emergencies=(0x4210,)))
-    memory = _Told(Memory(OWN, boot_ups=0))  # type: ignore[arg-type]
+    memory = _Told(SupervisorMemory(OWN, boot_ups=0))  # type: ignore[arg-type]
     row.holds(told, OWN, memory)  # type: ignore[arg-type]
     assert told.asked
     assert told.asked <= set(FACTS)
@@ -95,7 +95,7 @@ def test_a_condition_on_facts_asks_for_nothing_else(row: Condition) -> None:
 def _unmarked(row: Condition) -> Condition:
     """The same row, which itself looks whether the winch is what it is tested on."""
 
-    def holds(item: WinchInput, own: Supervised, memory: Memory) -> bool:
+    def holds(item: WinchInput, own: Supervised, memory: SupervisorMemory) -> bool:
         applies = not row.when or getattr(item, row.when)
         return bool(applies) and row.holds(item, own, memory)
 

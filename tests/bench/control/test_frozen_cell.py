@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from frozen_cell import CELLS, Cell, delays, false_trips, readings
-from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.bench.control.frozen_cell import FrozenCell, PredictedTension
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 BY_NAME = {cell.name: cell for cell in CELLS}
 
@@ -55,7 +55,7 @@ def test_a_quiet_cell_at_rest_never_trips(name: str) -> None:
         noise = cell.noise * (10 if random.random() < cell.bursts else 1)
         last = float(round(2000 + zero + random.gauss(0, noise)))
         when = (now, now + 0.002, now - 0.005, 0.005)
-        reading = Reading(last * 0.01, last * 0.01, last, Quality.GOOD, *when)
+        reading = InstrumentReading(last * 0.01, last * 0.01, last, Quality.GOOD, *when)
         assert test.update(reading, now + 0.002, moving=False) is None, now
 
 
@@ -78,7 +78,7 @@ def test_a_cell_that_froze_before_it_was_opened_is_seen_in_the_first_motion() ->
     test, found = FrozenCell(100.0, per_count=0.01), math.nan
     for k in range(400):
         now = k * 0.01
-        reading = Reading(100.0, 100.0, 10_001.0, Quality.GOOD, now, now, now, 0.0)
+        reading = InstrumentReading(100.0, 100.0, 10_001.0, Quality.GOOD, now, now, now, 0.0)
         predicted = 196.0 + (10.0 if now > 2.0 else 0.0)
         if test.update(reading, now, predicted, moving=now > 2.0) and math.isnan(found):
             found = now
@@ -95,7 +95,7 @@ def test_a_count_that_changes_again_ends_the_finding() -> None:
     assert "frozen" in words
     assert "conversions" in words
     assert "reset" in words
-    moved = Reading(1.0, 1.0, 100.0, Quality.GOOD, 63.1, 63.1, 63.1, 0.0)
+    moved = InstrumentReading(1.0, 1.0, 100.0, Quality.GOOD, 63.1, 63.1, 63.1, 0.0)
     assert test.update(moved, 63.1, moving=False) is None
 
 
@@ -105,7 +105,9 @@ def at_rest(test: FrozenCell, begin: float, seconds: float, noise: float) -> Non
         now = begin + k * 0.01
         raw = float(round(5000 + random.gauss(0, noise)))
         test.update(
-            Reading(raw * 0.01, raw, raw, Quality.GOOD, now, now, now, 0.0), now, moving=False
+            InstrumentReading(raw * 0.01, raw, raw, Quality.GOOD, now, now, now, 0.0),
+            now,
+            moving=False,
         )
 
 
@@ -127,7 +129,9 @@ def test_a_device_that_says_it_is_unstable_at_rest_is_accepted() -> None:
         now = k * 0.01
         raw = float(k)
         test.update(
-            Reading(raw, raw, raw, Quality.UNSTABLE, now, now, now, 0.0), now, moving=now < 1.0
+            InstrumentReading(raw, raw, raw, Quality.UNSTABLE, now, now, now, 0.0),
+            now,
+            moving=now < 1.0,
         )
         assert bool(test.unstable) == (now - 1.0 > 5.0)
 
@@ -139,17 +143,17 @@ def test_a_reading_without_a_count_proves_nothing() -> None:
         test.update(reading, reading.t_receive, moving=moving)
     for k in range(500):
         now = 62.0 + k * 0.01
-        lost = Reading(math.nan, math.nan, 5.0, Quality.AMBIGUOUS, now, now, now, 0.0)
+        lost = InstrumentReading(math.nan, math.nan, 5.0, Quality.AMBIGUOUS, now, now, now, 0.0)
         assert test.update(lost, now, moving=False) is None
 
 
 def test_a_hanging_load_is_heavier_while_it_is_lifted_faster() -> None:
     """20 kg lifted with 0.5 m/s²: 20 (9.80665 + 0.5) N; a drive that does not follow lifts none."""
-    load, idle = HangingLoad(20.0), HangingLoad(20.0)
+    load, idle = PredictedTension(20.0), PredictedTension(20.0)
     for k in range(26):
         now = k * 0.004
         lifted = load.tension(now, 0.5 * now, 0.5 * now)
         still = idle.tension(now, 0.5 * now, 0.0)
     assert lifted == pytest.approx(20 * (9.80665 + 0.5))
     assert still == pytest.approx(20 * 9.80665)
-    assert math.isnan(HangingLoad(math.nan).tension(0.0, 1.0, 1.0))
+    assert math.isnan(PredictedTension(math.nan).tension(0.0, 1.0, 1.0))

@@ -6,11 +6,11 @@ import pytest
 
 from winchkit.errors import LimitTripped, NotPermitted
 from winchkit.testing.opened import OpenedBench
-from winchkit.testing.plugin import SimBench
+from winchkit.testing.plugin import SimBenchFixture
 
 
 @pytest.fixture
-def sim(sim_bench: SimBench) -> OpenedBench:
+def sim(sim_bench: SimBenchFixture) -> OpenedBench:
     return sim_bench("spiral-bench")
 
 

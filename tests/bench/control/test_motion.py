@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from fake_axis import CYCLE, Rig, StraightLine
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
-from winchkit.bench.control.motion import Jog, Move, Trim
+from winchkit.bench.control.motion import Jog, PlannedMove, Trim
 from winchkit.bench.control.snapshot import Phase
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import LimitSpec
 
@@ -33,7 +33,7 @@ def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
     rig.run(0.3)
     assert rig.axes["A"].velocity == 0
     assert rig.controller().phase is Phase.DISABLED
-    assert rig.axes["A"].state is State.SWITCH_ON_DISABLED
+    assert rig.axes["A"].state is DriveState.SWITCH_ON_DISABLED
     moved = 4.0 - rig.cable().at(rig.axes["A"].angle)[0]
     assert 0 < moved <= 0.1 * (DEAD_MAN + 0.1)
 
@@ -142,7 +142,7 @@ def test_a_held_jog_stays_within_its_length_whatever_lag_is_declared(
 def test_a_move_arrives(target: float, position_mode: bool) -> None:
     rig = Rig(LIMITS)
     rig.axes["A"].position_mode = position_mode
-    move = Move(StraightLine(), LIMITS, target, speed=0.4)
+    move = PlannedMove(StraightLine(), LIMITS, target, speed=0.4)
     move.prepare(0.0)
     rig.controller().begin(move)
     rig.run(move.duration + 1.2)
@@ -166,7 +166,7 @@ class SoftLine(StraightLine):
 def test_a_trim_corrects_what_the_cable_became_on_the_way(longer: float) -> None:
     """Small corrections at rest; what is within 0.1 mm, or beyond belief, is left alone."""
     rig, line = Rig(LIMITS), SoftLine()
-    move = Move(line, LIMITS, 3.0, trim=Trim(CableMap(line), 3.0, LIMITS))
+    move = PlannedMove(line, LIMITS, 3.0, trim=Trim(CableMap(line), 3.0, LIMITS))
     move.prepare(0.0)
     rig.controller().begin(move)
     rig.run(move.duration / 2)
@@ -182,12 +182,12 @@ def test_a_trim_corrects_what_the_cable_became_on_the_way(longer: float) -> None
 
 def test_a_held_move_stays_enabled_until_stopped() -> None:
     rig = Rig(LIMITS)
-    move = Move(StraightLine(), LIMITS, 3.5, holds=True)
+    move = PlannedMove(StraightLine(), LIMITS, 3.5, holds=True)
     move.prepare(0.0)
     rig.controller().begin(move)
     rig.run(move.duration + 2.0)
     assert rig.controller().done
-    assert rig.axes["A"].state is State.OPERATION_ENABLED
+    assert rig.axes["A"].state is DriveState.OPERATION_ENABLED
     rig.controller().run_down()
     rig.run(0.1)
     assert rig.controller().phase is Phase.DISABLED
@@ -197,7 +197,7 @@ def test_a_move_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
     rig = Rig(LIMITS)
     jog(rig, 0.3, hold=1.0)
     rig.run(0.5)
-    move = Move(StraightLine(), LIMITS, 4.2)
+    move = PlannedMove(StraightLine(), LIMITS, 4.2)
     rig.controller().begin(move)
     rig.run(4.0)
     assert 4.0 - 0.005 * rig.axes["A"].angle == pytest.approx(4.2, abs=1e-3)
@@ -231,7 +231,7 @@ def test_after_a_stop_nothing_energises_whatever_came_before(
     rig.run(3.0)
     assert not ENERGISING & set(axis.words[before:])
     assert 0x0F not in axis.words[before:]
-    assert axis.state is State.SWITCH_ON_DISABLED
+    assert axis.state is DriveState.SWITCH_ON_DISABLED
     assert rig.controller().phase is Phase.DISABLED
 
 
@@ -269,13 +269,15 @@ def test_a_command_after_a_ramp_that_became_a_quick_stop_waits_for_the_stop(
     rig.controller().run_down()
     rig.step(7)
     assert axis.words[-1] == 0x02
-    axis.state = State.QUICK_STOP_ACTIVE
+    axis.state = DriveState.QUICK_STOP_ACTIVE
     before = len(axis.words)
     length = rig.cable().at(axis.angle)[0]
     if joins:
         jog(rig, -0.1, hold=30.0)
     else:
-        rig.controller().begin(Move(rig.cable(), rig.limits, length=length + 0.05, speed=0.1))
+        rig.controller().begin(
+            PlannedMove(rig.cable(), rig.limits, length=length + 0.05, speed=0.1)
+        )
     rig.step(late)
     axis.alive = True
     rig.run(8.0)
@@ -300,7 +302,7 @@ def test_a_command_after_a_ramp_that_became_a_quick_stop_waits_for_the_stop(
 )
 def test_moves_beyond_the_limits_are_refused(arguments: dict[str, float], words: str) -> None:
     with pytest.raises(NotPermitted, match=words):
-        Move(StraightLine(), LIMITS, **arguments)  # type: ignore[arg-type]
+        PlannedMove(StraightLine(), LIMITS, **arguments)  # type: ignore[arg-type]
 
 
 @settings(max_examples=80, deadline=None)

@@ -10,7 +10,7 @@ from fake_axis import CYCLE, Rig
 from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.snapshot import Phase
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.errors import MotionError, NotPermitted
 from winchkit.schema.bench import LimitSpec
 
@@ -38,13 +38,13 @@ def kinds(rig: Rig) -> list[str]:
 @pytest.mark.parametrize(
     "state",
     [
-        State.SWITCH_ON_DISABLED,
-        State.READY_TO_SWITCH_ON,
-        State.SWITCHED_ON,
-        State.QUICK_STOP_ACTIVE,
+        DriveState.SWITCH_ON_DISABLED,
+        DriveState.READY_TO_SWITCH_ON,
+        DriveState.SWITCHED_ON,
+        DriveState.QUICK_STOP_ACTIVE,
     ],
 )
-def test_a_drive_that_leaves_operation_enabled_is_latched(state: State) -> None:
+def test_a_drive_that_leaves_operation_enabled_is_latched(state: DriveState) -> None:
     rig = moving_rig()
     rig.axes["A"].state = state
     rig.step(3)
@@ -63,24 +63,24 @@ def test_a_drive_that_leaves_while_it_ramps_down_is_latched() -> None:
     rig = moving_rig()
     rig.controller().run_down()
     rig.step(5)
-    rig.axes["A"].state = State.SWITCHED_ON
+    rig.axes["A"].state = DriveState.SWITCHED_ON
     rig.step(3)
     assert kinds(rig) == ["state"]
 
 
 def test_a_drive_that_somebody_else_enables_is_disabled_and_latched() -> None:
     rig = Rig(LIMITS, "AB")
-    rig.axes["B"].state = State.OPERATION_ENABLED
+    rig.axes["B"].state = DriveState.OPERATION_ENABLED
     rig.step(3)
     assert kinds(rig) == ["state"]
-    assert rig.axes["B"].state is not State.OPERATION_ENABLED
+    assert rig.axes["B"].state is not DriveState.OPERATION_ENABLED
     rig.run(0.5)
     assert rig.controller("B").phase is Phase.DISABLED
 
 
 def test_an_order_that_comes_with_the_trip_enables_nothing() -> None:
     rig = Rig(LIMITS, "AB")
-    rig.axes["B"].state = State.OPERATION_ENABLED
+    rig.axes["B"].state = DriveState.OPERATION_ENABLED
     jog(rig)
     rig.step(2)
     before = len(rig.axes["A"].words)
@@ -119,7 +119,7 @@ def test_lost_targets_are_seen_once_the_dead_man_expires() -> None:
         rig.step()
         assert rig.now - released < 0.15
     assert kinds(rig)[0] == "slowing down"
-    while rig.axes["A"].state is State.OPERATION_ENABLED:
+    while rig.axes["A"].state is DriveState.OPERATION_ENABLED:
         rig.step()
     assert rig.now - released < 0.15
     assert rig.axes["A"].sdo_stops >= 1
@@ -136,7 +136,7 @@ def test_a_sluggish_drive_is_not_taken_for_an_unresponsive_one() -> None:
     def slow(*args: object, **keys: float) -> int:
         before = axis.velocity
         word = send(*args, **keys)  # type: ignore[arg-type]
-        if axis.state is State.OPERATION_ENABLED:
+        if axis.state is DriveState.OPERATION_ENABLED:
             axis.velocity = before + (axis.velocity - before) * 0.004 / lag
         return word
 
@@ -159,7 +159,7 @@ def test_an_exception_in_the_loop_stops_every_drive_from_prepared_frames() -> No
     except OverflowError as error:
         rig.loop.fail(error, rig.now)
     assert rig.axes["A"].words[-1] == 0x02
-    assert rig.axes["A"].state is State.QUICK_STOP_ACTIVE
+    assert rig.axes["A"].state is DriveState.QUICK_STOP_ACTIVE
     trip = rig.supervisor.tripped[0]
     assert trip.kind == "loop"
     assert "OverflowError: int too big to convert" in trip.message
@@ -186,7 +186,7 @@ def test_a_target_beyond_the_drives_range_is_a_trip_of_that_winch() -> None:
     rig.step(2)
     assert kinds(rig) == ["target"]
     rig.run(1.0)
-    assert rig.axes["A"].state is State.SWITCH_ON_DISABLED
+    assert rig.axes["A"].state is DriveState.SWITCH_ON_DISABLED
 
 
 def test_a_stall_of_this_computer_is_named_and_no_device_is_blamed() -> None:
@@ -287,7 +287,7 @@ def test_a_drive_is_not_enabled_for_a_permission_that_has_expired(cycles: int) -
     rig.controller().begin(Jog(rig.cable(), LIMITS, 0.2, DeadMan(expires)))
     while rig.now < expires:
         rig.step()
-    before, enabled = len(rig.axes["A"].words), rig.axes["A"].state is State.OPERATION_ENABLED
+    before, enabled = len(rig.axes["A"].words), rig.axes["A"].state is DriveState.OPERATION_ENABLED
     rig.run(1.0)
     assert rig.controller().phase is Phase.DISABLED
     assert not kinds(rig)

@@ -15,7 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.bench.control.conditions import CONDITIONS, Condition, Exceeds
-from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
+from winchkit.bench.control.observation import (
+    Instrumented,
+    Supervised,
+    SupervisorMemory,
+    WinchInput,
+)
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.schema.bench import LimitSpec
 
@@ -32,7 +37,7 @@ BENCHES = (
     Supervised(LIMITS, stale=0.1, cycle=CYCLE, resolution=1e-3, safe_length=8.5),
     Supervised(LimitSpec(speed=0.4), stale=0.1, cycle=CYCLE),
 )
-Formula = Callable[[WinchInput, Supervised, Memory], bool]
+Formula = Callable[[WinchInput, Supervised, SupervisorMemory], bool]
 
 
 def _in_time(item: WinchInput) -> bool:
@@ -195,7 +200,7 @@ def test_a_reading_that_stays_leads_to_the_same_rate_again(
     readings: list[tuple[float, float, int, bool]], moving: WinchInput
 ) -> None:
     """One memory sees the same object for several cycles, the other an equal one in each."""
-    same, equal = Memory(BENCHES[0]), Memory(BENCHES[0])
+    same, equal = SupervisorMemory(BENCHES[0]), SupervisorMemory(BENCHES[0])
     now, newest = 1.0, 1.0
     for step, value, cycles, stamped in readings:
         newest += step

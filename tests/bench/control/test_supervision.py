@@ -10,7 +10,7 @@ from fake_axis import Rig
 from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.snapshot import Phase
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.drivers.reading import Quality
 from winchkit.schema.bench import LimitSpec
 
@@ -35,7 +35,7 @@ def assert_all_stopped(rig: Rig) -> None:
     rig.run(3.0)
     for name, axis in rig.axes.items():
         assert rig.controller(name).phase in (Phase.DISABLED, Phase.STOPPING)
-        assert axis.state is not State.OPERATION_ENABLED or not axis.alive
+        assert axis.state is not DriveState.OPERATION_ENABLED or not axis.alive
 
 
 @pytest.mark.parametrize("victim", ["A", "B"])
@@ -74,7 +74,7 @@ def test_a_drive_that_changes_by_itself_stops_all(attribute: str, value: bool, k
 
 def test_a_drive_fault_stops_all_and_says_which() -> None:
     rig = moving_rig()
-    rig.axes["B"].state = State.FAULT
+    rig.axes["B"].state = DriveState.FAULT
     rig.axes["B"].fault_text = "error 8611h following error"
     rig.step(3)
     assert "8611h following error" in str(rig.supervisor.tripped[0])
@@ -205,7 +205,7 @@ def test_a_callback_that_raises_stops_all_and_is_kept() -> None:
     rig.loop.callbacks.append(broken)
     rig.run(3.0)
     assert isinstance(rig.loop.failure, ZeroDivisionError)
-    assert all(axis.state is State.SWITCH_ON_DISABLED for axis in rig.axes.values())
+    assert all(axis.state is DriveState.SWITCH_ON_DISABLED for axis in rig.axes.values())
 
 
 def test_the_host_heartbeat_is_tied_to_the_loop() -> None:

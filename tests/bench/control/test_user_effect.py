@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from fake_axis import Rig
 from winchkit import open_bench
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import Move
+from winchkit.bench.control.motion import PlannedMove
 from winchkit.bench.control.snapshot import Phase
 from winchkit.catalog import find
 from winchkit.cli import main
@@ -161,7 +161,7 @@ def test_an_effect_that_fails_under_way_ramps_the_winch_down(
     now = CableEstimator(declared, terms_of(declared, load_catalogue([file])), 0.0)
     limits = LimitSpec(0.6, 1.0, (0.5, 9.0))
     rig = Rig(limits, cable=CableMap.of(now))
-    rig.controller().begin(Move(rig.cable(), limits, 2.0))
+    rig.controller().begin(PlannedMove(rig.cable(), limits, 2.0))
     rig.run(0.25)
     assert rig.axes["A"].velocity > 0
     assert rig.loop.failure is None

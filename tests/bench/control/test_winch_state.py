@@ -12,7 +12,7 @@ from winchkit.bench.control.conditions import CONDITIONS, Condition
 from winchkit.bench.control.observation import FACTS, WinchInput, facts_of
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.winch_state import known
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 
 NOW = 100.0
 RESUMED = 1.0
@@ -25,7 +25,7 @@ SENSORS = {"cell": CELL, "length": LENGTH}
 
 def parts(*, faulty: bool) -> Any:
     """A winch whose parts answer with values that no other part has."""
-    state = State.FAULT if faulty else State.OPERATION_ENABLED
+    state = DriveState.FAULT if faulty else DriveState.OPERATION_ENABLED
     feedback = Made(angle=3.0, velocity=2.0, time=99.5, sync=8, state=state)
     axis = Made(
         feedback=feedback,

@@ -16,7 +16,7 @@ from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.runs import read_run
-from winchkit.schema.programme import Programme, Step, write_programme
+from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
@@ -50,7 +50,7 @@ class Rig:
             self.clock.sleep(0.05)
         raise AssertionError("it did not happen within 50 s")
 
-    def start(self, folder: Path, *steps: Step) -> None:
+    def start(self, folder: Path, *steps: ProgrammeStep) -> None:
         path = folder / "own.toml"
         write_programme(Programme("own", steps), path)
         self.station.start_programme(str(path), str(folder / "runs"))
@@ -80,10 +80,15 @@ def rig(opened: tuple[Bench, LiveBench, SimulatedClock]) -> Iterator[Rig]:
 
 def test_its_steps_its_question_and_its_files_are_reported(rig: Rig, tmp_path: Path) -> None:
     before = rig.length
-    rig.start(tmp_path, Step(by=-0.02, speed=SPEED), Step(ask="look at it"), Step(hold=0.2))
+    rig.start(
+        tmp_path,
+        ProgrammeStep(by=-0.02, speed=SPEED),
+        ProgrammeStep(ask="look at it"),
+        ProgrammeStep(hold=0.2),
+    )
     assert rig.until(lambda state: state["step"] == 1)["does"] == "winch all by -0.02 m"
     with pytest.raises(UsageError, match="under way; end it first"):
-        rig.start(tmp_path, Step(hold=0.1))
+        rig.start(tmp_path, ProgrammeStep(hold=0.1))
     rig.until(lambda state: state["asks"] == "look at it")
     assert rig.bench.snapshot.at_rest, "the winches are disabled while it asks"
     rig.clock.sleep(1.2 * LIFE_SIGN)  # a question needs no sign of life
@@ -97,9 +102,11 @@ def test_its_steps_its_question_and_its_files_are_reported(rig: Rig, tmp_path: P
         rig.station.answer_programme()
 
 
-@pytest.mark.parametrize("step", [Step(hold=5.0), Step(by=-1.0, speed=0.1)])
-def test_it_ends_where_its_client_falls_silent(rig: Rig, tmp_path: Path, step: Step) -> None:
-    rig.start(tmp_path, step, Step(by=-0.1, speed=SPEED))
+@pytest.mark.parametrize("step", [ProgrammeStep(hold=5.0), ProgrammeStep(by=-1.0, speed=0.1)])
+def test_it_ends_where_its_client_falls_silent(
+    rig: Rig, tmp_path: Path, step: ProgrammeStep
+) -> None:
+    rig.start(tmp_path, step, ProgrammeStep(by=-0.1, speed=SPEED))
     rig.until(lambda state: state["step"] == 1)
     rig.clock.sleep(LIFE_SIGN + 0.6)
     state = rig.state()
@@ -113,7 +120,7 @@ def test_it_ends_where_its_client_falls_silent(rig: Rig, tmp_path: Path, step: S
 
 @pytest.mark.parametrize("way", ["end_programme", "close", "stop"])
 def test_it_is_ended_by_its_client_and_by_a_stop(rig: Rig, tmp_path: Path, way: str) -> None:
-    rig.start(tmp_path, Step(by=-0.5, speed=0.2), Step(hold=0.5))
+    rig.start(tmp_path, ProgrammeStep(by=-0.5, speed=0.2), ProgrammeStep(hold=0.5))
     begun = rig.length
     rig.until(lambda state: state["step"] == 1 and abs(rig.length - begun) > 0.005)
     getattr(rig.station, way)()
@@ -130,7 +137,7 @@ def test_another_clients_winch_and_an_unknown_file_are_refused(rig: Rig, tmp_pat
     with rig.bench.commanders.acting(other):
         rig.bench.commanders.claim("A")
     with pytest.raises(NotPermitted, match="commanded by jog"):
-        rig.start(tmp_path, Step(hold=0.1))
+        rig.start(tmp_path, ProgrammeStep(hold=0.1))
     rig.bench.commanders.leave(other)
     bench = tmp_path / "profile.toml"
     bench.write_text(Path(catalog.find("profiles", "bench-spiral")).read_text())

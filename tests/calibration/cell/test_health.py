@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from winchkit.calibration.cell.health import Health, Samples, examine
+from winchkit.calibration.cell.health import CellSamples, Health, examine
 from winchkit.errors import RunError
 
 RATE, DIVISION = 120.0, 0.01
@@ -22,7 +22,7 @@ def made(
     step: float = 0.0,
     creep: float = 0.0,
     broken: int = 0,
-) -> Samples:
+) -> CellSamples:
     """Readings of 100 N; ``creep`` N a unit of the logarithm of the time after a step at 3 s."""
     random = np.random.default_rng(7)
     time = np.arange(round(seconds * RATE)) / RATE
@@ -35,7 +35,7 @@ def made(
     usable = np.ones(len(time), bool)
     usable[:broken] = False
     value = np.where(usable, raw * DIVISION, np.nan)
-    return Samples(time, raw, value, usable, ~usable)
+    return CellSamples(time, raw, value, usable, ~usable)
 
 
 def remarks(health: Health) -> str:
@@ -69,7 +69,7 @@ def test_slow_noise_is_no_drift() -> None:
             value[k] = value[k - 1] * math.exp(-1 / RATE) + random.normal(0, 0.05)
         raw = np.round((100 + value) / DIVISION)
         usable = np.ones(len(time), bool)
-        health = examine(Samples(time, raw, raw * DIVISION, usable, ~usable))
+        health = examine(CellSamples(time, raw, raw * DIVISION, usable, ~usable))
         found += abs(health.drift) > 4 * health.drift_std
     assert found <= 3
 
@@ -114,7 +114,9 @@ def test_counts_that_never_change_are_reported() -> None:
 def test_readings_that_repeat_are_reported() -> None:
     samples = made()
     raw = np.repeat(samples.raw[::4], 4)[: len(samples.raw)]
-    health = examine(Samples(samples.time, raw, raw * DIVISION, samples.usable, samples.saturated))
+    health = examine(
+        CellSamples(samples.time, raw, raw * DIVISION, samples.usable, samples.saturated)
+    )
     assert health.duplicates == pytest.approx(0.75, abs=0.02)
     assert "faster than it converts" in remarks(health)
 

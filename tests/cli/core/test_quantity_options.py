@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from command_tree import commands
 from winchkit.cli import main
-from winchkit.cli.core.quantity_type import Quantity, naming
+from winchkit.cli.core.quantity_type import QuantityType, naming
 from winchkit.errors import UsageError
 from winchkit.units import parse
 
@@ -21,7 +21,7 @@ PLAIN = [
     (words, parameter)
     for words, command in commands()
     for parameter in command.params
-    if isinstance(parameter.type, Quantity)
+    if isinstance(parameter.type, QuantityType)
 ]
 COMPOUND = {
     "calibrate --noise": "position=3 furlongs",
@@ -70,7 +70,7 @@ def test_a_wrong_unit_names_the_option(words: str, parameter: click.Parameter) -
     assert result.exit_code == 2
     assert name in result.stderr
     assert f"'{WRONG}'" in result.stderr
-    assert isinstance(parameter.type, Quantity)
+    assert isinstance(parameter.type, QuantityType)
     assert f"'{parameter.type.example}'" in result.stderr
     assert "Traceback" not in result.stderr
 
@@ -103,7 +103,7 @@ def test_a_wrong_unit_within_a_value_names_the_option(
 )
 def test_examples_and_defaults_are_accepted(parameter: click.Parameter) -> None:
     kind = parameter.type
-    assert isinstance(kind, Quantity)
+    assert isinstance(kind, QuantityType)
     for text in (kind.example, parameter.default):
         if isinstance(text, str):
             assert kind.convert(text, parameter, None) == text

@@ -11,7 +11,7 @@ import pytest
 
 from can_commands import Served, invoke, served
 from winchkit.bench.emergency_stop import stop_on_bus
-from winchkit.sim.drive.nmt import NmtState
+from winchkit.sim.drive.nmt import NodeState
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_a_drive_that_is_nmt_stopped_is_named_as_such(bench: Served) -> None:
     with bench.live.up_to_date():
         drive.receive(0x602, bytes.fromhex("2B17100032000000"), bench.live._now())  # 1017h = 50 ms
         drive.receive(0x000, bytes([0x02, 2]), bench.live._now())
-    assert drive.nmt is NmtState.STOPPED
+    assert drive.nmt is NodeState.STOPPED
     try:
         result = invoke("info", "B", "-b", bench.file)
         assert result.exit_code == 4, result.output
@@ -249,4 +249,4 @@ def restart(bench: Served) -> None:
         now = bench.live._now()
         drive.power_on(now, boot_time=0.0)
         drive.tick(now)
-    assert drive.nmt is NmtState.PRE_OPERATIONAL
+    assert drive.nmt is NodeState.PRE_OPERATIONAL

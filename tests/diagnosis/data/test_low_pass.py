@@ -10,7 +10,7 @@ import pytest
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.low_pass import Compared, removed_by_low_pass, torque_cut_off
+from winchkit.diagnosis.data.low_pass import UnfilteredOutput, removed_by_low_pass, torque_cut_off
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile
@@ -37,13 +37,13 @@ def fast_motor(seed: int, ripple: float, *, seconds: float = 4.0, noise: float =
     )
 
 
-def compared(run: Run) -> Compared:
-    return Compared(run["motor_angle"], run["motor_torque"], run["motor_torque"], RATE)
+def compared(run: Run) -> UnfilteredOutput:
+    return UnfilteredOutput(run["motor_angle"], run["motor_torque"], run["motor_torque"], RATE)
 
 
 def cut_off(errors: Sequence[Array], rate: float, speed: float = 1e3) -> float:
     """Cut-off where these errors are the torque itself."""
-    return torque_cut_off([Compared(e, e, e, rate) for e in errors], speed)
+    return torque_cut_off([UnfilteredOutput(e, e, e, rate) for e in errors], speed)
 
 
 def noisy(seed: int, count: int = 4000) -> Array:
@@ -75,7 +75,10 @@ def test_noise_alone_raises_the_cut_off_in_few_of_many_cases() -> None:
 def test_noise_of_the_predicted_inertial_torque_raises_no_cut_off() -> None:
     """Second differences of white noise have most of their power at the highest frequencies."""
     inertial = np.diff(noisy(1, 4002), 2)
-    assert torque_cut_off([Compared(inertial, noisy(2), noisy(2) + inertial, 200.0)], 1e3) == 20.0
+    assert (
+        torque_cut_off([UnfilteredOutput(inertial, noisy(2), noisy(2) + inertial, 200.0)], 1e3)
+        == 20.0
+    )
 
 
 def test_the_highest_order_at_the_highest_speed_bounds_the_cut_off() -> None:

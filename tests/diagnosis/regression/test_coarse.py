@@ -8,9 +8,9 @@ import pytest
 from diagnosis_runs import GROOVED, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.coarse import CoarseTimeSeries, coarse_regression
-from winchkit.diagnosis.regression.gls import CoarseProblem, Target, fit, fit_from
+from winchkit.diagnosis.regression.gls import CoarseProblem, RequiredChiSquare, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.term import Term
 
@@ -19,7 +19,7 @@ STIFF = term("cable-elongation-exponential", strain_scale=2e-3, force_scale=120.
 DAHL = term("pulley-dahl", friction=0.02, stiffness=3000.0)
 
 
-def problem(*terms: Term) -> tuple[TimeSeriesRegression, CoarseTimeSeries, Noise]:
+def problem(*terms: Term) -> tuple[TimeSeriesRegression, CoarseTimeSeries, BandNoise]:
     runs = [
         made(2 * mass + seed, GROOVED, terms, load_mass=float(mass), ride=RIDE)
         for mass in (10, 25)
@@ -89,7 +89,7 @@ def test_a_rival_far_from_its_target_is_abandoned_and_the_truth_is_not() -> None
     before = fit(regression, Hypothesis(), weights)
     true = Hypothesis().with_term(Term(STIFF.effect, STIFF.values), 4)
     best = fit_from(regression, [true], weights, begun)
-    target = Target(best.chi_square, before.chi_square)
+    target = RequiredChiSquare(best.chi_square, before.chi_square)
     rival = Hypothesis().with_term(term("motor-coulomb", torque=0.01), 4)
     assert fit_from(regression, [rival], weights, begun, target).abandoned
     assert not fit_from(regression, [true], weights, begun, target).abandoned

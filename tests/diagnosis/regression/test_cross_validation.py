@@ -17,7 +17,7 @@ from winchkit.diagnosis.regression.cross_validation import (
 )
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.term import Term
 
@@ -40,10 +40,10 @@ def problem_of(
     return TimeSeriesRegression(prepare(runs, GROOVED))
 
 
-def even(regression: TimeSeriesRegression) -> Noise:
+def even(regression: TimeSeriesRegression) -> BandNoise:
     """The true noise."""
     power = np.array([NOISE[output] ** 2 for output, _, _ in regression.bands])
-    return Noise(power, np.full(len(power), 1e9), dict(NOISE), from_repeats=True)
+    return BandNoise(power, np.full(len(power), 1e9), dict(NOISE), from_repeats=True)
 
 
 def fitted(regression: TimeSeriesRegression, *terms: Term) -> Fit:

@@ -17,7 +17,7 @@ from winchkit.diagnosis.regression.discretization import (
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.term import Term
 from winchkit.runs.run import Run
@@ -48,7 +48,9 @@ def sampled(seed: int, terms: tuple[Term, ...], every: int = FINER) -> Run:
     return replace(run, time=run.time[::every], channels=decimate)
 
 
-def fitted(terms: tuple[Term, ...], every: int = FINER) -> tuple[TimeSeriesRegression, Fit, Noise]:
+def fitted(
+    terms: tuple[Term, ...], every: int = FINER
+) -> tuple[TimeSeriesRegression, Fit, BandNoise]:
     regression = TimeSeriesRegression(
         prepare([sampled(s, terms, every) for s in range(4)], GROOVED)
     )

@@ -24,7 +24,7 @@ from winchkit.diagnosis.regression.dispersion import (
 )
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 
 ROWS = (12, 16, 32, 60, 120)
 """Rows of the bands, from the lowest frequency."""
@@ -41,7 +41,7 @@ DATA = cast(
         share_of_row=np.ones(len(BAND)),
     ),
 )
-NOISE = Noise(np.ones(len(ROWS)), np.full(len(ROWS), 200.0), {"torque": 1.0}, from_repeats=True)
+NOISE = BandNoise(np.ones(len(ROWS)), np.full(len(ROWS), 200.0), {"torque": 1.0}, from_repeats=True)
 
 Misfit = Callable[[np.random.Generator], Array]
 
@@ -60,7 +60,7 @@ def wander(random: np.random.Generator) -> Array:
     return 30.0 / np.arange(1, len(BAND) + 1) * random.standard_normal(len(BAND))
 
 
-def fitted(column: Array, measured: Array, noise: Noise) -> Fit:
+def fitted(column: Array, measured: Array, noise: BandNoise) -> Fit:
     weight = 1 / np.sqrt(noise.power[BAND])
     (value,), *_ = np.linalg.lstsq(column[:, None] * weight[:, None], measured * weight)
     residual = measured - value * column

@@ -22,7 +22,7 @@ from winchkit.diagnosis.regression.intervals import (
     profile_ends,
     spread_of,
 )
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 RIDE = Ride(samples=400)
@@ -105,7 +105,7 @@ def test_estimates_have_the_units_and_parameters_of_the_files() -> None:
     assert abs(gain["gain_error"].value - 0.01) < 4 * gain["gain_error"].std
 
 
-def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, Noise]:
+def _settled(regression: TimeSeriesRegression, start: Hypothesis) -> tuple[Fit, BandNoise]:
     first = fit(regression, start, np.ones(regression.n_rows))
     noise = noise_from_repeats(regression, first.residual, np.zeros((regression.n_rows, 0)))
     return fit(regression, start, noise.inverse_sigma(regression)), noise
@@ -301,7 +301,7 @@ def test_intervals_of_many_programmes_cover_the_truth(runs: int, between: float)
     start = Hypothesis().with_term(term("cell-gain"), runs)
     column = regression.change(Hypothesis().with_term(GAIN, runs)) / 0.01
     power = np.full(len(regression.bands), 0.8**2)
-    noise = Noise(power, np.full(len(power), 1e6), {"tension": 0.8}, from_repeats=True)
+    noise = BandNoise(power, np.full(len(power), 1e6), {"tension": 0.8}, from_repeats=True)
     one = 0.8 / np.sqrt(float(column @ column) / runs)
     inside, cases = 0, 200 if runs < 60 else 60
     for seed in range(cases):

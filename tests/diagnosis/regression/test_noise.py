@@ -14,7 +14,7 @@ from diagnosis_runs import Array, Ride, length_problem, term
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 
 RIDE = Ride(samples=300)
@@ -40,14 +40,14 @@ def fitted(regression: TimeSeriesRegression) -> Fit:
     return fit(regression, Hypothesis(), np.full(regression.n_rows, 1 / SIZE))
 
 
-def estimated(regression: TimeSeriesRegression, known: Array | None = None) -> Noise:
+def estimated(regression: TimeSeriesRegression, known: Array | None = None) -> BandNoise:
     none = np.zeros((regression.n_rows, 0))
     return noise_from_repeats(
         regression, fitted(regression).residual, none if known is None else known
     )
 
 
-def judged(regression: TimeSeriesRegression) -> tuple[LackOfFitTest, Noise]:
+def judged(regression: TimeSeriesRegression) -> tuple[LackOfFitTest, BandNoise]:
     found = fitted(regression)
     none = np.zeros((regression.n_rows, 0))
     noise = noise_from_repeats(regression, found.residual, none)

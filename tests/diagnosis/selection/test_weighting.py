@@ -10,7 +10,7 @@ from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.weighting import reweighted
@@ -46,7 +46,7 @@ def rides(added: list[Array], **friction: float) -> list[Run]:
     ]
 
 
-def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, Noise]:
+def with_friction(runs: list[Run]) -> tuple[TimeSeriesSelection, Fit, BandNoise]:
     engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
     start = engine.initial_model.with_term(
         term("motor-coulomb", torque=FRICTION), engine.regression.n_runs

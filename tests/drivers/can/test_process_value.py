@@ -24,7 +24,7 @@ from winchkit.errors import NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.instruments.process import ProcessInstrument as SimInstrument
+from winchkit.sim.instruments.process import SimulatedProcessInstrument as SimInstrument
 
 CLOCK = MonotonicClock()
 NODE = 5

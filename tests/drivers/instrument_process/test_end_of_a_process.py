@@ -21,8 +21,8 @@ from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.instrument_process.process import (
     InstrumentProcess,
-    InstrumentSpec,
-    LineSpec,
+    LineInstrument,
+    ProcessLineSpec,
     line_of,
 )
 from winchkit.drivers.instrument_process.separate import SeparateInstrument
@@ -40,10 +40,10 @@ _ATTACH, _DETACH = 16, 17
 """Requests of ptrace(2)."""
 
 
-def line_at(port: int) -> LineSpec:
+def line_at(port: int) -> ProcessLineSpec:
     device = read_device(catalog.find("devices", "laumas-tlb"))
     bus = BusSpec("modbus-tcp", host="127.0.0.1", port=port, timeout=0.1)
-    return LineSpec("cells", bus, (InstrumentSpec("cell of winch A", device, 1, 50.0),))
+    return ProcessLineSpec("cells", bus, (LineInstrument("cell of winch A", device, 1, 50.0),))
 
 
 def until(condition: Callable[[], bool], within: float = 5.0) -> float:

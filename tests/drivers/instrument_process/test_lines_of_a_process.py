@@ -20,12 +20,12 @@ from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.instrument_process.process import (
     InstrumentProcess,
-    InstrumentSpec,
-    LineSpec,
+    LineInstrument,
+    ProcessLineSpec,
     line_of,
 )
 from winchkit.drivers.publisher import HostScale
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.bench import BusSpec
@@ -50,7 +50,7 @@ def how(request: pytest.FixtureRequest) -> str:
 
 
 @contextmanager
-def served(how: str, line: LineSpec) -> Iterator[Served]:
+def served(how: str, line: ProcessLineSpec) -> Iterator[Served]:
     with ExitStack() as stack:
         made: Any = line_of(line, CLOCK)
         if how == "process":
@@ -64,10 +64,10 @@ def served(how: str, line: LineSpec) -> Iterator[Served]:
         yield Served(made.sensors, slow, made)
 
 
-def cells(peer: Peer, *units: int, timeout: float = 0.1) -> LineSpec:
+def cells(peer: Peer, *units: int, timeout: float = 0.1) -> ProcessLineSpec:
     bus = BusSpec("modbus-tcp", host="127.0.0.1", port=peer.port, timeout=timeout)
-    return LineSpec(
-        "cells", bus, tuple(InstrumentSpec(f"cell {unit}", DEVICE, unit, 100.0) for unit in units)
+    return ProcessLineSpec(
+        "cells", bus, tuple(LineInstrument(f"cell {unit}", DEVICE, unit, 100.0) for unit in units)
     )
 
 
@@ -85,7 +85,7 @@ def until(condition: Callable[[], bool], within: float = 6.0) -> None:
 
 
 def test_readings_are_judged_with_calibration_tare_and_times(how: str) -> None:
-    readings: list[Reading] = []
+    readings: list[InstrumentReading] = []
     with Peer() as peer:
         weigh(peer, 19_613)
         with served(how, cells(peer, 1)) as line:
@@ -247,8 +247,8 @@ def test_a_serial_line_with_a_device_that_sends_by_itself(how: str) -> None:
     ours, theirs = os.openpty()
     tty.setraw(theirs)
     bus = BusSpec("serial", port=os.ttyname(theirs), baudrate=115_200, timeout=0.2)
-    spec = LineSpec("line", bus, (InstrumentSpec("cell", device, None, None),))
-    readings: list[Reading] = []
+    spec = ProcessLineSpec("line", bus, (LineInstrument("cell", device, None, None),))
+    readings: list[InstrumentReading] = []
     try:
         with served(how, spec) as line:
             cell = line.sensors[0]

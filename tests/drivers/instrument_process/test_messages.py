@@ -10,7 +10,7 @@ import pytest
 
 from winchkit.drivers.instrument_process.messages import (
     Kind,
-    Messages,
+    MessageCutter,
     RawReading,
     json_message,
     message,
@@ -28,7 +28,7 @@ def test_messages_are_whole_however_they_arrive(size: int) -> None:
     said = [RawReading(k, 1.5 * k, 2.5 * k, -k, Quality.UNSTABLE, WHEN) for k in range(300)]
     sent = message(Kind.READY) + b"".join(map(reading_message, said))
     sent += json_message(Kind.REPLY, [7, {"serial number": 4711.0}, None])
-    messages, found = Messages(), []
+    messages, found = MessageCutter(), []
     for at in range(0, len(sent), size):
         found += messages.feed(sent[at : at + size])
     assert [kind for kind, _ in found] == [Kind.READY, *[Kind.READING] * 300, Kind.REPLY]
@@ -39,7 +39,7 @@ def test_messages_are_whole_however_they_arrive(size: int) -> None:
 def test_a_value_that_is_no_number_stays_none() -> None:
     flags = Quality.OVERLOAD | Quality.LATE
     sent = reading_message(RawReading(65_535, math.nan, math.inf, -math.inf, flags, WHEN))
-    ((_, content),) = Messages().feed(sent)
+    ((_, content),) = MessageCutter().feed(sent)
     said = raw_reading_of(content)
     assert said.instrument == 65_535
     assert math.isnan(said.value)

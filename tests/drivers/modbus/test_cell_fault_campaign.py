@@ -11,7 +11,7 @@ from cell_campaign.case import FAULTS, Plan, modbus_devices, play, spec_of
 from cell_faults import plans
 from winchkit.drivers.counters import Counters
 from winchkit.drivers.modbus.consistency import Consistency
-from winchkit.drivers.modbus.decoder import Decoder
+from winchkit.drivers.modbus.decoder import RegisterDecoder
 from winchkit.drivers.modbus.frames import AnswerGate
 from winchkit.drivers.modbus.late_replies import LateReplies
 
@@ -128,7 +128,7 @@ def test_a_wrong_word_order_reports_no_number_of_an_empty_cell(device: str, larg
 
 def test_a_large_number_is_accepted_once_the_order_is_known() -> None:
     """655 363 counts turned are 196 618: either may be, until another number decides."""
-    decoder = Decoder(spec_of("laumas-tlb"))
+    decoder = RegisterDecoder(spec_of("laumas-tlb"))
     told = {
         counts: decoder.word_order([0, *(counts >> 16, counts & 0xFFFF) * 2, 0, 0])
         for counts in (0, 7, 9_817, 196_618, 655_363, 999_999)

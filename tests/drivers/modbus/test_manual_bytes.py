@@ -9,15 +9,15 @@ import pytest
 
 from served import spec_of
 from winchkit import catalog
-from winchkit.drivers.modbus.decoder import Decoder, words_of
+from winchkit.drivers.modbus.decoder import RegisterDecoder, words_of
 from winchkit.drivers.modbus.frames import AnswerGate, crc16
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.reading import Quality
 from winchkit.schema.read import read_device
 
 
-def decoder(name: str) -> Decoder:
-    return Decoder(read_device(catalog.find("devices", name)))
+def decoder(name: str) -> RegisterDecoder:
+    return RegisterDecoder(read_device(catalog.find("devices", name)))
 
 
 def words(text: str) -> list[int]:

@@ -16,7 +16,7 @@ from modbus_campaign import CASES, Judge, play
 from modbus_peers.faulty_line import COPY_REQUESTS, FaultyLine
 from winchkit.drivers.modbus.late_replies import LateReplies
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals"),
@@ -59,7 +59,7 @@ def test_the_judge_knows_a_number_by_its_age(late: float, wrong: int) -> None:
     ticks = round((100.001 - late) / modbus_campaign.TICK) % modbus_campaign.MODULUS
     value = (modbus_campaign.OFFSET + ticks) * 0.01
     judge = Judge(CASES[0])
-    judge(Reading(value, value, 0.0, Quality.GOOD, 100.0, 100.002, 99.9995, 0.0035))
+    judge(InstrumentReading(value, value, 0.0, Quality.GOOD, 100.0, 100.002, 99.9995, 0.0035))
     assert len(judge.wrong) == wrong
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import catalog
-from winchkit.drivers.modbus.decoder import Decoder
+from winchkit.drivers.modbus.decoder import RegisterDecoder
 from winchkit.drivers.reading import Quality
 from winchkit.errors import FileError
 from winchkit.schema.devices.device import DeviceSpec
@@ -25,8 +25,8 @@ def device(field: FieldSpec, count: int = 3, status: int | None = 0) -> DeviceSp
 
 
 @cache
-def laumas() -> Decoder:
-    return Decoder(read_device(catalog.find("devices", "laumas-tlb")))
+def laumas() -> RegisterDecoder:
+    return RegisterDecoder(read_device(catalog.find("devices", "laumas-tlb")))
 
 
 def registers(status: int, gross: int, net: int) -> list[int]:
@@ -100,7 +100,7 @@ def test_every_type_in_every_order(data: st.DataObject, kind: str, order: str) -
         wire = bytes(big["ABCD".index(letter)] for letter in order)
     words = [0, *struct.unpack(f">{len(wire) // 2}H", wire), 0][:3]
     field = FieldSpec("v", 1, kind, order, unit="N", scale=0.5)  # type: ignore[arg-type]
-    value, _, counts, _, _ = Decoder(device(field)).decode(words)
+    value, _, counts, _, _ = RegisterDecoder(device(field)).decode(words)
     assert counts == number
     assert value == pytest.approx(number * 0.5)
 
@@ -108,14 +108,14 @@ def test_every_type_in_every_order(data: st.DataObject, kind: str, order: str) -
 @pytest.mark.parametrize("bits", [0x7FC00000, 0x7F800000, 0xFF800000])
 def test_a_float_that_is_no_number_is_a_fault(bits: int) -> None:
     field = FieldSpec("v", 1, "f32", unit="N")
-    value, _, _, quality, _ = Decoder(device(field)).decode([0, bits >> 16, bits & 0xFFFF])
+    value, _, _, quality, _ = RegisterDecoder(device(field)).decode([0, bits >> 16, bits & 0xFFFF])
     assert math.isnan(value)
     assert quality is Quality.FAULT
 
 
 def test_units_become_si() -> None:
     field = FieldSpec("v", 1, "i32", unit="mm", scale=0.1)
-    assert Decoder(device(field)).decode([0, 0, 12345])[0] == pytest.approx(1.2345)
+    assert RegisterDecoder(device(field)).decode([0, 0, 12345])[0] == pytest.approx(1.2345)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_units_become_si() -> None:
 )
 def test_device_files_that_contradict_themselves(field: FieldSpec, status: int, words: str) -> None:
     with pytest.raises(FileError, match=words):
-        Decoder(device(field, status=status))
+        RegisterDecoder(device(field, status=status))
 
 
 def test_a_value_must_be_a_field_and_a_servo_is_no_instrument() -> None:
@@ -136,6 +136,6 @@ def test_a_value_must_be_a_field_and_a_servo_is_no_instrument() -> None:
     assert good.modbus is not None
     bad = dataclasses.replace(good, modbus=dataclasses.replace(good.modbus, value="w"))
     with pytest.raises(FileError, match="'w' is none of the fields v"):
-        Decoder(bad)
+        RegisterDecoder(bad)
     with pytest.raises(FileError, match="no Modbus instrument"):
-        Decoder(dataclasses.replace(good, modbus=None))
+        RegisterDecoder(dataclasses.replace(good, modbus=None))

@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from stream_rig import DEVICES, TIMEOUT, Rig, device
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.drivers.stream.line import StreamLine
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply, NotPermitted
 
@@ -35,7 +35,7 @@ def resolution(name: str) -> float:
     return {"and-ad-4406": 0.099, "mettler-mt-sics": 1e-4, "sartorius-sbi": 1e-4}.get(name, 0.1)
 
 
-def true_when_sampled(name: str, readings: list[Reading]) -> bool:
+def true_when_sampled(name: str, readings: list[InstrumentReading]) -> bool:
     """Whether every usable reading is the truth at a moment within its uncertainty."""
     return all(
         abs(one.value - ramp(one.t_sample))

@@ -8,7 +8,7 @@ import pytest
 
 from stream_rig import DEVICES, device
 from winchkit.drivers.reading import Quality
-from winchkit.drivers.stream.decoder import Decoded, Meaning, check_sum
+from winchkit.drivers.stream.decoder import FrameType, StreamContent, check_sum
 from winchkit.drivers.stream.parser import StreamParser
 from winchkit.schema.devices.stream import ChecksumSpec
 
@@ -16,7 +16,7 @@ G = 9.80665
 GOOD, UNSTABLE = Quality.GOOD, Quality.UNSTABLE
 
 
-def heard(name: str, data: bytes, address: int | None = None) -> Decoded | None:
+def heard(name: str, data: bytes, address: int | None = None) -> StreamContent | None:
     """What a device's frame says, where it says something."""
     parser = StreamParser(device(name), address)
     parser.begin()
@@ -25,7 +25,7 @@ def heard(name: str, data: bytes, address: int | None = None) -> Decoded | None:
     return items[0].frame.decoded if items else None
 
 
-def meaning(name: str, data: bytes) -> Meaning:
+def meaning(name: str, data: bytes) -> FrameType:
     parser = StreamParser(device(name))
     parser.begin()
     (item,) = parser.feed(data)
@@ -118,21 +118,21 @@ def test_what_is_no_measurement_is_not_a_number(name: str, data: bytes, quality:
 @pytest.mark.parametrize(
     ("name", "data", "expected"),
     [
-        ("and-ad-4406", b"I\r\n", Meaning.BUSY),
-        ("and-ad-4406", b"?\r\n", Meaning.REFUSED),
-        ("and-ad-4406", b"MT\r\n", Meaning.ANSWER),
-        ("mettler-mt-sics", b"S I\r\n", Meaning.BUSY),
-        ("mettler-mt-sics", b"ES\r\n", Meaning.REFUSED),
-        ("mettler-mt-sics", b"Z A\r\n", Meaning.ANSWER),
-        ("mettler-mt-sics", b"T S     100.00 g\r\n", Meaning.ANSWER),
-        ("hbm-aed-ascii", b"0\r\n", Meaning.ANSWER),
-        ("hbm-aed-ascii", b"?\r\n", Meaning.REFUSED),
-        ("mantracourt-dsc-ascii", b"?\r", Meaning.REFUSED),
-        ("flintec-ldu", b"OK\r\n", Meaning.ANSWER),
-        ("flintec-ldu", b"ERR\r\n", Meaning.REFUSED),
+        ("and-ad-4406", b"I\r\n", FrameType.BUSY),
+        ("and-ad-4406", b"?\r\n", FrameType.REFUSED),
+        ("and-ad-4406", b"MT\r\n", FrameType.ANSWER),
+        ("mettler-mt-sics", b"S I\r\n", FrameType.BUSY),
+        ("mettler-mt-sics", b"ES\r\n", FrameType.REFUSED),
+        ("mettler-mt-sics", b"Z A\r\n", FrameType.ANSWER),
+        ("mettler-mt-sics", b"T S     100.00 g\r\n", FrameType.ANSWER),
+        ("hbm-aed-ascii", b"0\r\n", FrameType.ANSWER),
+        ("hbm-aed-ascii", b"?\r\n", FrameType.REFUSED),
+        ("mantracourt-dsc-ascii", b"?\r", FrameType.REFUSED),
+        ("flintec-ldu", b"OK\r\n", FrameType.ANSWER),
+        ("flintec-ldu", b"ERR\r\n", FrameType.REFUSED),
     ],
 )
-def test_answers_that_are_no_values(name: str, data: bytes, expected: Meaning) -> None:
+def test_answers_that_are_no_values(name: str, data: bytes, expected: FrameType) -> None:
     assert meaning(name, data) is expected
 
 
@@ -194,7 +194,7 @@ def test_mantracourt_says_by_a_bit_that_its_value_is_old() -> None:
     parser = StreamParser(asking_whether_fresh(device("mantracourt-dsc-ascii")))
     parser.begin()
     old, new, over = parser.feed(b"8192\r0\r512\r")
-    assert old.frame.meaning is Meaning.STATUS
+    assert old.frame.meaning is FrameType.STATUS
     assert old.frame.decoded is not None
     assert new.frame.decoded is not None
     assert over.frame.decoded is not None

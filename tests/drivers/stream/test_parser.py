@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stream_rig import DEVICES, device, stream
-from winchkit.drivers.stream.decoder import Meaning
+from winchkit.drivers.stream.decoder import FrameType
 from winchkit.drivers.stream.framing import BinaryFraming, TextFraming
 from winchkit.drivers.stream.matcher import Matcher, fits
-from winchkit.drivers.stream.parser import Item, StreamParser
+from winchkit.drivers.stream.parser import StreamFrame, StreamParser
 from winchkit.schema.template import parts_of
 from winchkit.sim.instruments.stream_frames import IndicatorState, Speech
 
@@ -43,7 +43,7 @@ def parser(name: str, *, begun: bool = False) -> StreamParser:
     return found
 
 
-def in_chunks(found: StreamParser, data: bytes, cuts: list[int]) -> list[Item]:
+def in_chunks(found: StreamParser, data: bytes, cuts: list[int]) -> list[StreamFrame]:
     edges = [0, *sorted(cut % (len(data) + 1) for cut in cuts), len(data)]
     return [item for start, end in pairwise(edges) for item in found.feed(data[start:end])]
 
@@ -103,7 +103,7 @@ def test_whatever_comes_every_byte_is_accounted_for(name: str, data: st.DataObje
         decoded = item.frame.decoded
         if decoded is not None and decoded.quality.usable:
             value = decoded.value
-            assert math.isfinite(value) or item.frame.meaning is Meaning.STATUS
+            assert math.isfinite(value) or item.frame.meaning is FrameType.STATUS
         elif decoded is not None:
             assert math.isnan(decoded.value)
 

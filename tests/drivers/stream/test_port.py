@@ -20,9 +20,9 @@ from winchkit.drivers.stream.line import StreamLine
 from winchkit.drivers.stream.port import set_latency
 from winchkit.errors import ConnectionLost, DeviceRefused
 from winchkit.schema.bench import BusSpec
-from winchkit.sim.instruments.stream import StreamInstrument as SimInstrument
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument as SimInstrument
 from winchkit.sim.instruments.stream import shown_by
-from winchkit.sim.instruments.stream_line import StreamLine as SimLine
+from winchkit.sim.instruments.stream_line import SimulatedStreamLine as SimLine
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs pseudo-terminals")
 PATIENCE = 20.0

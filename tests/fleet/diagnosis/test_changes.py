@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
-from winchkit.fleet.diagnosis.changes import Series, change_of, session_variance, step_date
+from winchkit.fleet.diagnosis.changes import ParameterSeries, change_of, session_variance, step_date
 from winchkit.fleet.diagnosis.robust_variance import Variance, robust_variance
 
 DAY = 86400.0
 KNOWN = Variance(0.0, np.inf)
 
 
-def series(values: np.ndarray, std: float = 1.0, days: np.ndarray | None = None) -> Series:
+def series(values: np.ndarray, std: float = 1.0, days: np.ndarray | None = None) -> ParameterSeries:
     times = DAY * (np.arange(len(values)) if days is None else days)
-    return Series(np.asarray(times, dtype=float), values, np.full(len(values), std))
+    return ParameterSeries(np.asarray(times, dtype=float), values, np.full(len(values), std))
 
 
 def test_a_step_without_noise_has_its_size_place_and_closed_form_p_value() -> None:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from winchkit.fleet.diagnosis.changes import Series
+from winchkit.fleet.diagnosis.changes import ParameterSeries
 from winchkit.fleet.diagnosis.limit_date import limit_date
 from winchkit.fleet.diagnosis.robust_variance import Variance
 
 KNOWN = Variance(0.0, np.inf)
 
 
-def line(slope: float, noise: np.ndarray | float = 0.0) -> Series:
+def line(slope: float, noise: np.ndarray | float = 0.0) -> ParameterSeries:
     times = np.arange(12.0)
-    return Series(times, slope * times + noise, np.ones(12))
+    return ParameterSeries(times, slope * times + noise, np.ones(12))
 
 
 def test_a_line_reaches_its_limit_at_the_quotient() -> None:

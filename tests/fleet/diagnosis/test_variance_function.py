@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from winchkit.fleet.diagnosis.changes import Series, Variance, change_of
+from winchkit.fleet.diagnosis.changes import ParameterSeries, Variance, change_of
 from winchkit.fleet.diagnosis.variance_function import moderated_stds, power_of_stated
 
 WINCHES, SESSIONS = 60, 24
@@ -70,7 +70,7 @@ def test_steps_that_are_none_are_as_rare_as_the_level_says() -> None:
         for own, s in zip(values, stated, strict=True):
             times = np.arange(float(SESSIONS))
             for stds, count in ((s, "plain"), (moderated_stds(s, power), "moderated")):
-                found = change_of(Series(times, own, stds), Variance(0.0, 500.0))
+                found = change_of(ParameterSeries(times, own, stds), Variance(0.0, 500.0))
                 assert found is not None
                 if found.p_value < 1e-3:
                     plain += count == "plain"

@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 from figure_drawn import across, down, drawn, polylines
 from report_parsed import HOSTILE, Page
 from winchkit.report.figures.export import png, write_figures
-from winchkit.report.figures.figure import Axis, Cells, Figure, Panel, RunMark, Series
+from winchkit.report.figures.figure import (
+    Figure,
+    FigureAxis,
+    FigureSeries,
+    GridCells,
+    Panel,
+    RunMark,
+)
 from winchkit.report.figures.layout import NARROW, WIDE, density_levels, scene_of, signed_levels
 from winchkit.report.figures.tokens import DARK, LIGHT, STYLES, style_sheet
 from winchkit.report.html.page import figure_block
@@ -30,18 +37,18 @@ def over_time(seed: int, count: int, size: float, gap: bool = False) -> Figure:
     if gap:
         residual[count // 5 : count // 3] = np.nan
     signals = (
-        Series("measured", "measured", x, measured),
-        Series("predicted", "today", x, measured - residual),
+        FigureSeries("measured", "measured", x, measured),
+        FigureSeries("predicted", "today", x, measured - residual),
     )
-    errors = (Series("residual", "today", x, residual),)
+    errors = (FigureSeries("residual", "today", x, residual),)
     return Figure(
         "time-tension",
         "Tension over time",
         "words",
-        Axis("time", "s", limits=(0.0, 0.1 * count)),
+        FigureAxis("time", "s", limits=(0.0, 0.1 * count)),
         (
-            Panel(Axis("measured and predicted", "N"), signals),
-            Panel(Axis("residual", "N", zero=True), errors, band=0.5 * size),
+            Panel(FigureAxis("measured and predicted", "N"), signals),
+            Panel(FigureAxis("residual", "N", zero=True), errors, band=0.5 * size),
         ),
         (RunMark(0.0, "a", "demo 10 kg"), RunMark(0.05 * count, "b", "demo 20 kg")),
         zoom=True,
@@ -109,7 +116,7 @@ def test_hostile_names_are_text_in_every_file() -> None:
         plain.id,
         HOSTILE,
         HOSTILE,
-        Axis(HOSTILE, "s"),
+        FigureAxis(HOSTILE, "s"),
         plain.panels,
         (RunMark(0.0, HOSTILE, HOSTILE), RunMark(1.5, "=HYPERLINK(1)", "x")),
         source=HOSTILE,
@@ -131,9 +138,13 @@ def test_a_density_counts_every_sample_and_has_a_scale_with_numbers() -> None:
     values = np.full((3, 2), np.nan)
     values[0, 0], values[2, 1] = 120.0, 1.0
     levels = density_levels(120)
-    cells = Cells("samples per cell", "", np.arange(4.0), np.arange(3.0), values, levels)
+    cells = GridCells("samples per cell", "", np.arange(4.0), np.arange(3.0), values, levels)
     figure = Figure(
-        "over", "t", "c", Axis("load", "N"), (Panel(Axis("residual", "N"), cells=cells),)
+        "over",
+        "t",
+        "c",
+        FigureAxis("load", "N"),
+        (Panel(FigureAxis("residual", "N"), cells=cells),),
     )
     rows = list(csv.DictReader(io.StringIO(figure.table().csv())))
     assert [float(row["samples per cell"]) for row in rows] == [120.0, 1.0]

@@ -16,9 +16,9 @@ from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compared
 from winchkit.diagnosis.residuals.attribution import attributions
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
-from winchkit.quantity_text import Scale
+from winchkit.quantity_text import PrintScale
 from winchkit.report.figures.axes import Range, range_of, reading
-from winchkit.report.figures.figure import Axis
+from winchkit.report.figures.figure import FigureAxis
 from winchkit.report.figures.maps import map_text
 from winchkit.report.pages.pages import comparison_html
 from winchkit.report.text import compare_text
@@ -68,7 +68,7 @@ def test_the_largest_cell_is_reported() -> None:
     mean[3, 2] = -2e-3
     planted = replace(drawn, mean=mean, share=0.5)
     assert planted.largest == (3, 2)
-    text = map_text(planted, Scale("mm", 1e-3))
+    text = map_text(planted, PrintScale("mm", 1e-3))
     assert text.startswith("over free length and load 50 %, most −2.0 mm at ")
 
 
@@ -112,7 +112,7 @@ def test_ticks_are_round_even_and_few(low: float, span: float, count: int) -> No
 
 
 def test_a_logarithmic_axis_has_powers_of_ten() -> None:
-    axis = range_of(Axis("distance", "m", logarithmic=True), [1e-5, 2.0])
+    axis = range_of(FigureAxis("distance", "m", logarithmic=True), [1e-5, 2.0])
     ticks = [value for value, _ in axis.ticks(5)]
     assert ticks == pytest.approx([1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0])
     assert axis.share(1e-3) == pytest.approx(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from report_parsed import HOSTILE, Page
 from winchkit.diagnosis.results import Estimate
-from winchkit.profile_edit.history import Rung
+from winchkit.profile_edit.history import HistoryStep
 from winchkit.quantity_text import between, plain
 from winchkit.report.pages.history import ladder_html
 from winchkit.report.words.vocabulary import interval_text
@@ -19,8 +19,10 @@ from winchkit.report.words.vocabulary import interval_text
 RUNS = ("a.csv", "b.csv")
 NOISE = {"tension": 0.8}
 GROWN = (
-    Rung("add", "pulley-coulomb", date(2026, 11, 1), RUNS, {"tension": 4.0}, {"tension": 1}, NOISE),
-    Rung("add", "mine", date(2026, 11, 2), RUNS, {"tension": 1.0}, {"tension": 0.8}, NOISE),
+    HistoryStep(
+        "add", "pulley-coulomb", date(2026, 11, 1), RUNS, {"tension": 4.0}, {"tension": 1}, NOISE
+    ),
+    HistoryStep("add", "mine", date(2026, 11, 2), RUNS, {"tension": 1.0}, {"tension": 0.8}, NOISE),
 )
 
 
@@ -45,7 +47,7 @@ def test_an_empty_ledger_says_so_and_names_stay_text() -> None:
 
 
 def test_a_step_that_was_not_judged_has_a_dash() -> None:
-    bare = Rung("remove", "mine", date(2026, 11, 3))
+    bare = HistoryStep("remove", "mine", date(2026, 11, 3))
     page = Page(ladder_html("p", (*GROWN, bare)))
     assert page.text.rstrip().endswith("–")
     assert "− mine" in page.text

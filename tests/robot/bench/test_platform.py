@@ -20,7 +20,7 @@ from winchkit.bench.control.loop import Callback
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.model.rotation import rotation_by
-from winchkit.robot import Found, Pose, Robot
+from winchkit.robot import Pose, PosesFound, Robot
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.platform import Platform
 from winchkit.schema.bench import BenchSpec
@@ -228,7 +228,7 @@ def test_lengths_that_fit_two_poses_move_nothing(
 ) -> None:
     plain = Robot.poses_at
 
-    def twofold(robot: Robot, *given: Any, **options: Any) -> Found:
+    def twofold(robot: Robot, *given: Any, **options: Any) -> PosesFound:
         found = plain(robot, *given, **options)
         turned = rotation_by(np.array([[0.5, 0.0, 0.0]])) @ found.pose.rotation
         return replace(found, pose=Pose(found.pose.position, turned), other=found.pose)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import robot_rectangle
 import robot_self_calibrated
 from winchkit.bench.bench import Bench
-from winchkit.bench.tracker import TrackedPose, Tracker
+from winchkit.bench.tracker import TrackedPose, TrackerReceiver
 from winchkit.errors import MotionError, UsageError
 from winchkit.robot.bench.self_calibration import PoseVolume, _stages, self_calibrated
 from winchkit.runs.run import Run
@@ -55,7 +55,7 @@ def test_the_rectangle_needs_an_estimate_of_the_friction() -> None:
 
 def test_too_few_poses_are_refused_before_anything_moves() -> None:
     with pytest.raises(UsageError, match="at least 10 and 1"):
-        self_calibrated(None, Tracker(lambda: 0.0), poses=9)  # type: ignore[arg-type]
+        self_calibrated(None, TrackerReceiver(lambda: 0.0), poses=9)  # type: ignore[arg-type]
 
 
 def test_a_quick_stop_between_two_poses_ends_the_calibration(bench: Bench) -> None:
@@ -65,7 +65,7 @@ def test_a_quick_stop_between_two_poses_ends_the_calibration(bench: Bench) -> No
     def angles() -> list[float]:
         return [winch.motor_angle for winch in bench.snapshot.winch.values()]
 
-    class Stopping(Tracker):
+    class Stopping(TrackerReceiver):
         def require(self, since: float, address: str) -> list[TrackedPose]:
             bench.stop_now()
             rested.append(angles())

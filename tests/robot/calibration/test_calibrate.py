@@ -17,7 +17,7 @@ from winchkit.robot.calibration.calibrate import Calibrated, calibrate, split
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.pose_design import next_poses
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import Measured, joined
+from winchkit.robot.files.poses import MeasuredPoses, joined
 from winchkit.schema.profiles.robot import PriorSpec
 
 NO_BOUNDS = {
@@ -241,7 +241,7 @@ def test_proposed_poses_say_more_than_poses_at_random() -> None:
         weight = np.array([0, 0, -3 * 9.80665, 0, 0, 0])
         assert nnls(structure, -weight)[1] < 1e-9, "cables that pull hold the platform"
 
-    def volume(extra: Measured) -> float:
+    def volume(extra: MeasuredPoses) -> float:
         both = joined([fit, extra])
         again = calibrate(robot(), both, out, Options(sigma=found.weights.sigma))
         return float(np.sum(np.log2(1 + again.observed.information))) / 2

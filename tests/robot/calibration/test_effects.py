@@ -14,22 +14,22 @@ from winchkit.errors import UsageError
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 
 
 @pytest.fixture(scope="module")
-def elastic() -> tuple[Measured, Measured]:
+def elastic() -> tuple[MeasuredPoses, MeasuredPoses]:
     """Poses to fit and to judge by, of cables of 20 kN (0.5 mm of steel)."""
     fit = measured(csv(elastic_rows(90, 7), tension=True))
     return fit, measured(csv(elastic_rows(30, 77, EXACT), angles=True, tension=True))
 
 
-def with_effects(data: tuple[Measured, Measured], *effects: str) -> Calibrated:
+def with_effects(data: tuple[MeasuredPoses, MeasuredPoses], *effects: str) -> Calibrated:
     return calibrate(robot(), *data, Options(effects))
 
 
 def test_hidden_elasticity_is_explained_by_the_effect_and_by_nothing_else(
-    elastic: tuple[Measured, Measured],
+    elastic: tuple[MeasuredPoses, MeasuredPoses],
 ) -> None:
     without = with_effects(elastic)
     shifted = with_effects(elastic, "home-length")
@@ -54,7 +54,7 @@ def test_hidden_elasticity_is_explained_by_the_effect_and_by_nothing_else(
 
 @pytest.mark.parametrize("law", ["quartic", "exponential"])
 def test_laws_that_bend_fit_a_straight_cable_too(
-    elastic: tuple[Measured, Measured], law: str
+    elastic: tuple[MeasuredPoses, MeasuredPoses], law: str
 ) -> None:
     found = with_effects(elastic, f"cable-elongation-{law}")
     assert rms(found.validation_after.distance) < 3e-5

@@ -20,8 +20,8 @@ from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.selection import with_instruments
 from winchkit.robot.forces.elongation import strain_of
 from winchkit.robot.geometry.constraints import winding_of
-from winchkit.robot.identification.bundle_adjustment import State, moved
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.bundle_adjustment import BundleState, moved
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import declared_instruments
 from winchkit.robot.identification.parameters import LAWS
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
@@ -29,7 +29,9 @@ from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec,
 FEW = 6
 
 
-def equations(*effects: str, middle_force: float | None = None) -> tuple[Equations, State]:
+def equations(
+    *effects: str, middle_force: float | None = None
+) -> tuple[RobotEquations, BundleState]:
     """Everything measured at a few poses, and a state a little off."""
     text = csv(
         elastic_rows(FEW, 3), angles=True, swivel=True, length=True, tension=middle_force is None
@@ -45,10 +47,10 @@ def equations(*effects: str, middle_force: float | None = None) -> tuple[Equatio
     values = made.parameters.nominal + 0.3 * scale * np.abs(rng.normal(size=len(scale)))
     true = [row.angles for row in elastic_rows(FEW, 3)]
     turned = rotation_of(*(np.array(true) + 0.01 * rng.normal(size=(FEW, 3))).T)
-    return made, State(values, Pose(found.position + 1e-3, turned))
+    return made, BundleState(values, Pose(found.position + 1e-3, turned))
 
 
-def residuals(made: Equations, state: State) -> dict[str, Array]:
+def residuals(made: RobotEquations, state: BundleState) -> dict[str, Array]:
     return {rows.kind: rows.residual for rows in made.rows(state)}
 
 
@@ -73,8 +75,8 @@ def test_derivatives_are_those_of_the_residuals(effects: tuple[str, ...]) -> Non
     for k in np.flatnonzero(made.parameters.free):
         step = np.zeros(len(state.values))
         step[k] = 1e-3 * made.parameters.std[k]
-        up = residuals(made, State(state.values + step, state.pose))
-        down = residuals(made, State(state.values - step, state.pose))
+        up = residuals(made, BundleState(state.values + step, state.pose))
+        down = residuals(made, BundleState(state.values - step, state.pose))
         for kind, by_values in derived.items():
             # Forces by geometry are left out of the balance's derivatives, by design.
             if kind == "balance" and not made.parameters.all[k].name.startswith("payload"):
@@ -112,8 +114,8 @@ def test_computed_forces_change_strain_by_the_payload_as_they_should() -> None:
     for k in (*block["payload_mass"], *block["payload_centre"]):
         step = np.zeros(len(state.values))
         step[k] = 1e-4
-        up = residuals(made, State(state.values + step, state.pose))["closure"]
-        down = residuals(made, State(state.values - step, state.pose))["closure"]
+        up = residuals(made, BundleState(state.values + step, state.pose))["closure"]
+        down = residuals(made, BundleState(state.values - step, state.pose))["closure"]
         np.testing.assert_allclose(
             closure.by_values[..., k], (up - down) / 2e-4, rtol=1e-4, atol=1e-9
         )
@@ -227,13 +229,13 @@ def test_gains_of_cells_and_scales_of_counters_have_the_derivatives_of_their_res
     values = made.parameters.nominal
     values[made.parameters.block["cell_gain"]] = 0.02
     values[made.parameters.block["length_scale"]] = -0.01
-    state = State(values, state.pose)
+    state = BundleState(values, state.pose)
     for block in ("cell_gain", "length_scale", "length_offset"):
         for k in made.parameters.block[block]:
             step = np.zeros(len(values))
             step[k] = 1e-6
-            up = residuals(made, State(values + step, state.pose))
-            down = residuals(made, State(values - step, state.pose))
+            up = residuals(made, BundleState(values + step, state.pose))
+            down = residuals(made, BundleState(values - step, state.pose))
             for rows_ in made.rows(state):
                 slope = np.nan_to_num((up[rows_.kind] - down[rows_.kind]) / 2e-6)
                 found = np.zeros_like(slope) if rows_.by_values is None else rows_.by_values[..., k]

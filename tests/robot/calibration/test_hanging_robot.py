@@ -20,7 +20,7 @@ from winchkit.robot.calibration import pose_design as robot_next
 from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.forces.balance import hanging_balance
 from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.schema.profiles.robot import PriorSpec
@@ -69,7 +69,7 @@ def wound_in(line: int, shorter: float) -> float:
 
 
 @lru_cache(maxsize=1)
-def hanging() -> tuple[Robot, Measured]:
+def hanging() -> tuple[Robot, MeasuredPoses]:
     """The nominal robot, and measurements of the true one."""
     rng = np.random.default_rng(3)
     home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
@@ -81,7 +81,7 @@ def hanging() -> tuple[Robot, Measured]:
     motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter.tolist()])
     seen = np.array(poses)
     nothing = np.full((COUNT, ROPES), np.nan)
-    measured = Measured(
+    measured = MeasuredPoses(
         motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
         position=seen[:, :3] + rng.normal(0, TRACKER, (COUNT, 3)),
         angles=seen[:, 3:] + rng.normal(0, ANGLE, (COUNT, 3)),
@@ -164,7 +164,7 @@ def forces(pose: Array) -> Array:
     return np.asarray(found)
 
 
-def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Robot, Measured]:
+def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Robot, MeasuredPoses]:
     """The true robot, and swivels, cells and roll and pitch of an IMU at poses at rest."""
     rng = np.random.default_rng(seed)
     home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
@@ -179,7 +179,7 @@ def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Ro
     angles = np.array(poses)[:, 3:] + rng.normal(0, 5e-4, (count, 3))
     angles[:, 2] = np.nan
     nothing = np.full((count, ROPES), np.nan)
-    measured = Measured(
+    measured = MeasuredPoses(
         motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
         position=np.full((count, 3), np.nan),
         angles=angles,

@@ -12,7 +12,7 @@ import robot_mistakes
 from robot_poses.mistaken import KINDS, Scene, mistake_of, profile_text, recorded
 from winchkit.errors import RunError
 from winchkit.robot import robot_of
-from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.robot.mistakes.search import mistakes_in, refuse_mistakes
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
@@ -68,7 +68,7 @@ def test_the_sentence_says_where_what_and_what_to_do(tmp_path: Path) -> None:
     table = recorded(SCENE)
     run, path = written(tmp_path, replace(table, motor=-table.motor, oriented=False).csv())
     profile = read_robot(path)
-    measured: Measured = read_poses([read_run(run)], profile)
+    measured: MeasuredPoses = read_poses([read_run(run)], profile)
     with pytest.raises(RunError) as told:
         refuse_mistakes(robot_of(profile), measured)
     text = str(told.value)

@@ -14,7 +14,7 @@ from winchkit.model.rotation import rotation_by
 from winchkit.robot import robot_of
 from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.schema.profiles.instruments import InstrumentSpec, TrackerSpec
 
 FRAME = rotation_by(np.array([[0.3, -0.5, 2.0]]))[0]
@@ -22,12 +22,12 @@ SHIFT = np.array([1.2, -0.7, 0.4])
 SEED = 451
 
 
-def set_up_anew(poses: Measured) -> Measured:
+def set_up_anew(poses: MeasuredPoses) -> MeasuredPoses:
     """The positions in another frame."""
     return replace(poses, position=poses.position @ FRAME.T + SHIFT)
 
 
-def spoilt(poses: Measured, count: int, size: float) -> tuple[Measured, set[str]]:
+def spoilt(poses: MeasuredPoses, count: int, size: float) -> tuple[MeasuredPoses, set[str]]:
     """Some positions off by a length in random directions, and their places."""
     rng = np.random.default_rng(SEED)
     which = rng.choice(len(poses), count, replace=False)

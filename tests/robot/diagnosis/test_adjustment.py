@@ -15,7 +15,7 @@ from winchkit.robot.calibration.calibrate import calibrate
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.diagnosis.adjustment import equations_of, fitted_point, geometry_parameters
 from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
-from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.bundle_adjustment import BundleState
 from winchkit.robot.identification.variance_components import START
 from winchkit.runs import read_run
 from winchkit.schema.profiles.robot import PriorSpec
@@ -39,7 +39,7 @@ def test_derivatives_by_the_geometry_are_those_of_the_residuals(dataset: RobotDa
     geometry = geometry_parameters(dataset)
     assert np.count_nonzero(geometry.lasting) == 65
     made, values = equations_of(dataset, geometry), geometry.nominal
-    state = State(values, made.start(values))
+    state = BundleState(values, made.start(values))
     by = {rows.kind: rows.by_values for rows in made.rows(state)}
     for index in np.flatnonzero(geometry.lasting):
         ends = []
@@ -47,7 +47,9 @@ def test_derivatives_by_the_geometry_are_those_of_the_residuals(dataset: RobotDa
             moved = values.copy()
             moved[index] += sign * 0.01 * geometry.std[index]
             there = robot_of(made.profile_at(moved))
-            ends.append(made.residuals(State(moved, state.pose), there, ["closure", "swivel"]))
+            ends.append(
+                made.residuals(BundleState(moved, state.pose), there, ["closure", "swivel"])
+            )
         for kind, up in ends[0].items():
             slope = (up - ends[1][kind]) / (0.02 * geometry.std[index])
             known, own = np.isfinite(slope), by[kind]

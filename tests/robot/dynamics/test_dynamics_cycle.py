@@ -15,7 +15,7 @@ from winchkit.model.stages import Signals
 from winchkit.robot import (
     PLAIN,
     DynamicsCycle,
-    Linear,
+    LinearLaw,
     Pose,
     RobotKernels,
     approximate_forces,
@@ -89,7 +89,7 @@ def test_inertia_of_the_winches_takes_the_torque_of_their_acceleration() -> None
 def test_elongation_on_a_moving_platform_is_that_of_its_dynamic_forces() -> None:
     stiffness = 1e5
     initial = approximate_forces(ROBOT.structure(ROBOT.home), ROBOT.weight(ROBOT.home), MIDDLE)[0]
-    correction = ElongationCorrection(ROBOT, [Linear(stiffness)] * 8, ROBOT.home, initial)
+    correction = ElongationCorrection(ROBOT, [LinearLaw(stiffness)] * 8, ROBOT.home, initial)
     cycle = DynamicsCycle(ROBOT, initial, 1e-3)
     pose, gain = flat_pose(ROBOT.home), [2.0, 0.0, 3.0, 0.0, 0.0, 1.0]
     at_rest = correction.update(pose)

@@ -16,7 +16,7 @@ from winchkit.robot import Pose, read_robot, robot_of, rotation_of
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import Planner
 from winchkit.robot.dynamics.rest import pendulum_modes, rest_poses
-from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
+from winchkit.robot.sim.platform import CablePlatform, Pulleys, RigidBody
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.units import GRAVITY
@@ -71,7 +71,7 @@ def test_the_simulated_platform_in_guides_swings_as_often() -> None:
     """Simulated with stiff cables; its guides hold the rest."""
     exits = np.array([[-0.4, 0.0, 3.0], [0.4, 0.0, 3.0]])
     anchors = np.array([[-0.4, 0.1, 0.0], [0.4, 0.1, 0.0]])
-    body = Body(4.0, np.zeros(3), np.diag([0.1, 0.3, 0.3]), anchors, (1, 0, 1, 0, 1, 0))
+    body = RigidBody(4.0, np.zeros(3), np.diag([0.1, 0.3, 0.3]), anchors, (1, 0, 1, 0, 1, 0))
     shifted = exits + np.array([0.0, 0.1, 0.0])
     pulleys = Pulleys(shifted, np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros(2))
     platform = CablePlatform(body, pulleys, np.array([0.0, 0.0, 1.2]), np.eye(3), 0.0)

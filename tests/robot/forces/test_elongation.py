@@ -15,10 +15,10 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot import (
     ElongationLaw,
-    Exponential,
-    Linear,
+    ExponentialLaw,
+    LinearLaw,
     Pose,
-    Quartic,
+    QuarticLaw,
     Robot,
     RobotCycle,
     approximate_forces,
@@ -28,9 +28,9 @@ from winchkit.robot import (
 from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 
 Array = np.ndarray
-LINEAR = Linear(439.13e3)
-QUARTIC = Quartic(3e5, 2e7, -1e8, 5e11)
-EXPONENTIAL = Exponential(1500.0, -1.0)
+LINEAR = LinearLaw(439.13e3)
+QUARTIC = QuarticLaw(3e5, 2e7, -1e8, 5e11)
+EXPONENTIAL = ExponentialLaw(1500.0, -1.0)
 LAWS = (LINEAR, QUARTIC, EXPONENTIAL)
 
 
@@ -51,17 +51,17 @@ def test_strain_and_force_are_inverses(law: ElongationLaw, strain: float) -> Non
 
 def test_laws_are_the_papers_equations() -> None:
     e = 1e-3
-    assert Linear(2e5, 30.0).force(e) == pytest.approx(2e5 * e + 30)
-    assert Quartic(1, 2, 3, 4, 5).force(2.0) == 4 * 16 + 3 * 8 + 2 * 4 + 1 * 2 + 5
-    assert Exponential(1000.0, 7.0).force(e) == pytest.approx(np.exp(1) + 7)
+    assert LinearLaw(2e5, 30.0).force(e) == pytest.approx(2e5 * e + 30)
+    assert QuarticLaw(1, 2, 3, 4, 5).force(2.0) == 4 * 16 + 3 * 8 + 2 * 4 + 1 * 2 + 5
+    assert ExponentialLaw(1000.0, 7.0).force(e) == pytest.approx(np.exp(1) + 7)
 
 
 def test_a_force_that_no_strain_gives_is_nan() -> None:
-    assert np.isnan(Exponential(1000.0, 7.0).strain(7.0))
-    assert np.isnan(Quartic(1e5, k2=-1e8).strain(26.0))
-    assert Quartic(1e5, k2=-1e8).strain(24.0) == pytest.approx(4e-4)
-    assert Exponential(1000.0).force(1.0) == np.inf
-    for law in (Linear, Quartic, Exponential):
+    assert np.isnan(ExponentialLaw(1000.0, 7.0).strain(7.0))
+    assert np.isnan(QuarticLaw(1e5, k2=-1e8).strain(26.0))
+    assert QuarticLaw(1e5, k2=-1e8).strain(24.0) == pytest.approx(4e-4)
+    assert ExponentialLaw(1000.0).force(1.0) == np.inf
+    for law in (LinearLaw, QuarticLaw, ExponentialLaw):
         with pytest.raises(UsageError, match="k1 of an elongation law is 0"):
             law(0.0)
 
@@ -113,7 +113,7 @@ def elastic_pose(robot: Robot, motor_angles: Array, stiffness: float, initial: A
 def test_a_robot_of_springs_comes_closer_to_where_it_was_sent() -> None:
     robot, stiffness = shipped("cabtive"), 5e3
     initial = reference_forces(robot, 60.0)
-    correction = ElongationCorrection(robot, [Linear(stiffness)] * 8, robot.home, initial)
+    correction = ElongationCorrection(robot, [LinearLaw(stiffness)] * 8, robot.home, initial)
     at_home = elastic_pose(robot, np.zeros((1, 8)), stiffness, initial)
     np.testing.assert_allclose(at_home, robot.home.position[0], atol=1e-9)
     for shift in ([0.0, 0.0, 0.2], [0.15, 0.1, 0.1], [-0.1, 0.2, -0.15], [0.2, -0.2, 0.0]):
@@ -164,10 +164,10 @@ def test_what_cannot_be_found_holds_the_last_good_correction() -> None:
 def test_a_law_without_strain_for_a_force_says_so() -> None:
     robot = shipped("ipanema3")
     initial = reference_forces(robot)
-    laws: list[ElongationLaw] = [LINEAR] * 7 + [Exponential(1000.0, 600.0)]
+    laws: list[ElongationLaw] = [LINEAR] * 7 + [ExponentialLaw(1000.0, 600.0)]
     with pytest.raises(UsageError, match=r"line 8: its elongation law has no strain for 4\d\d"):
         ElongationCorrection(robot, laws, robot.home, initial)
-    above = ElongationCorrection(robot, [Exponential(1000.0, 300.0)] * 8, robot.home, initial)
+    above = ElongationCorrection(robot, [ExponentialLaw(1000.0, 300.0)] * 8, robot.home, initial)
     high = Pose(np.array([[0.0, 0.0, 2.0]]), np.eye(3)[None])
     assert not above.update(flat(high, 0)).good
 

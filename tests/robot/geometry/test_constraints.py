@@ -33,8 +33,8 @@ from winchkit.robot.geometry.pose_estimation import (
 from winchkit.robot.geometry.pose_estimation import (
     start_pose as completed,
 )
-from winchkit.robot.identification.bundle_adjustment import State
-from winchkit.robot.identification.equations import KINDS, Equations
+from winchkit.robot.identification.bundle_adjustment import BundleState
+from winchkit.robot.identification.equations import KINDS, RobotEquations
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
     determinant_gain,
@@ -64,13 +64,13 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> RobotDataset:
     return replace(found, measured=replace(found.measured, angles=angles))
 
 
-def equations(dataset: RobotDataset) -> tuple[Equations, State]:
+def equations(dataset: RobotDataset) -> tuple[RobotEquations, BundleState]:
     """Every kind of equation at poses a little off."""
     made = replace(equations_of(robot(), dataset.measured, Options()), balanced=True)
     rng = np.random.default_rng(4)
     pose = made.start(made.parameters.nominal)
     pose = moved_pose(pose, rng.normal(0, 1e-3, (len(dataset.measured), 6)))
-    return made, State(made.parameters.nominal, pose)
+    return made, BundleState(made.parameters.nominal, pose)
 
 
 def test_lines_with_effects_have_the_lengths_of_the_winding_laws(dataset: RobotDataset) -> None:

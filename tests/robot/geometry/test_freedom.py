@@ -19,7 +19,7 @@ from winchkit.robot.calibration.identifiability import refuse_unfit
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.diagnosis.compare import compared
 from winchkit.robot.dynamics.dynamics import accelerations
-from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.runs import read_run
 from winchkit.schema.profiles.robot import COORDINATES, PlatformSpec, Point
 from winchkit.units import GRAVITY
@@ -183,6 +183,6 @@ def test_cables_in_a_plane_calibrate_no_platform_in_space(tmp_path: Path) -> Non
 def test_positions_across_the_guides_are_refused(tmp_path: Path) -> None:
     robot = planar()
     poses = read_poses([read_run(recorded(tmp_path / "poses.csv"))], robot.profile)
-    off: Measured = replace(poses, position=poses.position + np.array([0.0, 0.3, 0.0]))
+    off: MeasuredPoses = replace(poses, position=poses.position + np.array([0.0, 0.3, 0.0]))
     with pytest.raises(UsageError, match="300 mm from home along y"):
         refuse_unfit(equations_of(robot, off, Options()))

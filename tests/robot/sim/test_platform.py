@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from winchkit.arrays import Array
 from winchkit.robot import Pose, rotation_of
 from winchkit.robot.geometry.kinematics import Geometry, lengths, structure_matrix, wrap_angle
-from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
+from winchkit.robot.sim.platform import CablePlatform, Pulleys, RigidBody
 from winchkit.robot.sim.rotation import quaternion, rotation, turned
 from winchkit.units import GRAVITY
 
@@ -28,7 +28,7 @@ def plain(exits: Array, axis: Array = UP, radius: float = 0.0) -> Pulleys:
 
 def point_mass(exits: Array, at: Array, mass: float, damping_time: float = 0.0) -> CablePlatform:
     """A small ball whose cables all meet in its centre."""
-    body = Body(mass, np.zeros(3), 0.01 * np.eye(3), np.zeros((len(exits), 3)))
+    body = RigidBody(mass, np.zeros(3), 0.01 * np.eye(3), np.zeros((len(exits), 3)))
     return CablePlatform(body, plain(exits), at, np.eye(3), damping_time)
 
 
@@ -50,7 +50,7 @@ def test_lengths_directions_and_wraps_are_those_of_the_model(
     exits = np.array([[1.0, 1, 1], [-1, 1, 1.2], [-1, -1, 0.9], [1, -1, 1]])
     anchors = np.array([[0.2, 0.1, 0], [-0.1, 0.1, 0.1], [-0.1, -0.2, 0], [0.1, -0.1, -0.1]])
     pulleys = plain(exits, UP, 0.03)
-    body = Body(1.0, np.zeros(3), np.eye(3), anchors)
+    body = RigidBody(1.0, np.zeros(3), np.eye(3), anchors)
     pose = Pose(np.array([[x, y, z]]), rotation_of(0.1, pitch, yaw)[None])
     platform = CablePlatform(body, pulleys, pose.position[0], pose.rotation[0], 0.0)
     model = Geometry(exits, anchors, pulleys.radius, pulleys.axis)
@@ -102,7 +102,7 @@ def test_work_of_the_drums_is_stored_or_dissipated() -> None:
     """Power in through the cables' upper ends = change of energy + heat of the dampers."""
     exits = np.array([[s, t, h] for s in (-1.0, 1) for t in (-1.0, 1) for h in (0.0, 2)])
     anchors = exits * [0.1, 0.12, 0.05] + [0.0, 0, -0.05]
-    body = Body(5.0, np.array([0.01, 0, 0.02]), np.diag([0.1, 0.15, 0.2]), anchors)
+    body = RigidBody(5.0, np.array([0.01, 0, 0.02]), np.diag([0.1, 0.15, 0.2]), anchors)
     platform = CablePlatform(body, plain(exits, UP, 0.02), UP * 1.0, np.eye(3), 0.003)
     platform.tension = platform.equilibrium(80.0)
     assert np.all(platform.tension > 0)
@@ -135,7 +135,7 @@ def test_work_of_the_drums_is_stored_or_dissipated() -> None:
 
 
 def test_a_free_body_keeps_its_momentum() -> None:
-    body = Body(2.0, np.zeros(3), np.diag([0.1, 0.2, 0.25]), np.zeros((1, 3)))
+    body = RigidBody(2.0, np.zeros(3), np.diag([0.1, 0.2, 0.25]), np.zeros((1, 3)))
     platform = CablePlatform(body, plain(np.array([[0.0, 0, 9]])), np.zeros(3), np.eye(3), 0.0)
     platform.velocity = np.array([0.3, 0, 0, 2.0, 1.0, 0.5])
     momentum = body.inertia @ platform.velocity[3:]
@@ -153,7 +153,7 @@ def test_the_compiled_step_moves_as_the_plain_one() -> None:
     pytest.importorskip("numba")
     exits = np.array([[s, t, h] for s in (-1.0, 1) for t in (-1.0, 1) for h in (0.0, 2)])
     anchors = exits * [0.1, 0.12, 0.05] + [0.0, 0, -0.05]
-    body = Body(5.0, np.array([0.01, 0, 0.02]), np.diag([0.1, 0.15, 0.2]), anchors)
+    body = RigidBody(5.0, np.array([0.01, 0, 0.02]), np.diag([0.1, 0.15, 0.2]), anchors)
     pulleys = plain(exits, UP, 0.02)
     both = [
         CablePlatform(body, pulleys, UP * 1.0, np.eye(3), 0.003, compiled=compiled)

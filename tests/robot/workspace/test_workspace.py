@@ -19,7 +19,7 @@ from winchkit.errors import UsageError
 from winchkit.robot import ForceLimits, Pose, Robot, read_robot, robot_of, wrench_feasibility
 from winchkit.robot.workspace.circuits import Wrenches, margins
 from winchkit.robot.workspace.mesh import mesh_of, write_mesh
-from winchkit.robot.workspace.workspace import Demand, grid_of, workspace_of
+from winchkit.robot.workspace.workspace import CableDemand, grid_of, workspace_of
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [3.0, 0.2, 0.1], [0.4, 2.8, 0.2], [0.9, 0.8, 2.5]])
 
@@ -64,7 +64,7 @@ def test_wrenches_of_any_direction_are_those_of_the_worst_sampled_one() -> None:
 def test_wrench_closure_of_a_point_mass_is_the_tetrahedron_of_its_exit_points() -> None:
     robot = tetrahedron()
     volume = abs(np.linalg.det(CORNERS[1:] - CORNERS[0])) / 6
-    found = workspace_of(robot, grid_of(robot, 0.05), Demand())
+    found = workspace_of(robot, grid_of(robot, 0.05), CableDemand())
     counted, uncertainty = found.volume("wrench-closure")
     assert abs(counted - volume) < 0.1 * uncertainty
     assert mesh_of(found, "wrench-closure").volume == pytest.approx(volume, rel=0.1)
@@ -73,7 +73,7 @@ def test_wrench_closure_of_a_point_mass_is_the_tetrahedron_of_its_exit_points() 
 def test_three_hanging_cables_hold_a_point_mass_below_their_triangle() -> None:
     exits = ((0.0, 0.0, 3.0), (4.0, 0.0, 3.0), (1.0, 3.0, 3.0))
     robot = small_robot(exits, [(0.0, 0.0, 0.0)] * 3, ("x", "y", "z"), home=(1.5, 1.0, 1.5))
-    found = workspace_of(robot, grid_of(robot, 0.05), Demand(ForceLimits(0.0, 1e6)))
+    found = workspace_of(robot, grid_of(robot, 0.05), CableDemand(ForceLimits(0.0, 1e6)))
     area = 0.5 * 4.0 * 3.0
     for index in (0, len(found.grid.axes[2]) // 2):
         assert found.area("wrench-feasible", index) == pytest.approx(area, rel=0.02)
@@ -83,7 +83,7 @@ def test_three_hanging_cables_hold_a_point_mass_below_their_triangle() -> None:
 def test_twists_of_a_planar_platform_against_the_fastest_cable() -> None:
     robot = planar()
     grid = grid_of(robot, 0.2)
-    demand = Demand(cable_speed=np.full(4, 0.5), speed=0.3, rotation_speed=1.0)
+    demand = CableDemand(cable_speed=np.full(4, 0.5), speed=0.3, rotation_speed=1.0)
     found = workspace_of(robot, grid, demand).levels["twist-feasible"].ravel()
     pose = Pose(grid.positions, np.tile(np.eye(3), (len(grid.positions), 1, 1)))
     fastest = np.zeros(len(found))
@@ -97,7 +97,7 @@ def test_twists_of_a_planar_platform_against_the_fastest_cable() -> None:
 
 def test_rotations_only_take_from_a_workspace() -> None:
     robot = robot_of(read_robot("cabtive"))
-    demand = Demand(ForceLimits(5.0, 80.0))
+    demand = CableDemand(ForceLimits(5.0, 80.0))
     upright, turned = (
         workspace_of(robot, grid_of(robot, 0.1, turn=turn), demand) for turn in (0.0, 0.2)
     )
@@ -110,7 +110,7 @@ def test_rotations_only_take_from_a_workspace() -> None:
 @pytest.mark.parametrize("suffix", [".ply", ".obj"])
 def test_a_surface_is_closed_and_can_be_read_back(tmp_path: Path, suffix: str) -> None:
     robot = tetrahedron()
-    mesh = mesh_of(workspace_of(robot, grid_of(robot, 0.1), Demand()), "wrench-closure")
+    mesh = mesh_of(workspace_of(robot, grid_of(robot, 0.1), CableDemand()), "wrench-closure")
     edges = Counter((int(face[k]), int(face[(k + 1) % 4])) for face in mesh.face for k in range(4))
     assert all(edges[b, a] == count for (a, b), count in edges.items())
     path = tmp_path / f"shape{suffix}"
@@ -129,7 +129,7 @@ def test_a_surface_is_closed_and_can_be_read_back(tmp_path: Path, suffix: str) -
 
 def test_a_hanging_platform_is_judged_in_its_poses_of_rest() -> None:
     robot = robot_of(read_robot("hanging-4"))
-    found = workspace_of(robot, grid_of(robot, 0.5), Demand(ForceLimits(5.0, 400.0)))
+    found = workspace_of(robot, grid_of(robot, 0.5), CableDemand(ForceLimits(5.0, 400.0)))
     assert list(found.levels) == ["wrench-feasible"]
     volume, _ = found.volume("wrench-feasible")
     assert 10 < volume < 4 * 4 * 4.4, "below the four exit points, and not beside them"

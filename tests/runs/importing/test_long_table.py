@@ -22,7 +22,7 @@ from winchkit.runs.importing.long_table import axes_of, likely_axis
 from winchkit.runs.importing.mapping import guess_by, mapping_of
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 
 TIME = np.arange(120) * 0.02
 
@@ -111,7 +111,7 @@ def test_a_flag_that_toggles_names_no_axis(values: int, by_turns: bool, seed: in
     assert likely_axis(table) is None
 
 
-def table_of(rows: list[str], head: str) -> Table:
+def table_of(rows: list[str], head: str) -> ColumnTable:
     with tempfile.TemporaryDirectory() as folder:
         return read_table(written(Path(folder) / "a.csv", rows, head))
 

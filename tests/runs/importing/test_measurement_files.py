@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from winchkit.errors import RunError
 from winchkit.runs.export import export
 from winchkit.runs.importing.formats.source import read_table
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 
 _META, _NEW_LIST, _RAW = 1 << 1, 1 << 2, 1 << 3
 _DOUBLE, _TEXT, _NO_DATA = 10, 0x20, 0xFFFFFFFF
@@ -49,13 +49,13 @@ def tdms(objects: Mapping[str, tuple[Sequence[float] | None, Mapping[str, float 
     return lead + meta + raw
 
 
-def read(folder: Path, name: str, data: bytes) -> Table:
+def read(folder: Path, name: str, data: bytes) -> ColumnTable:
     path = folder / name
     path.write_bytes(data)
     return read_table(path)
 
 
-def values(table: Table, source: str) -> list[float]:
+def values(table: ColumnTable, source: str) -> list[float]:
     column = table.column(source)
     assert column is not None, [item.source for item in table.columns]
     return [float(value) for value in column.values]

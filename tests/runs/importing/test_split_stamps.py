@@ -15,7 +15,7 @@ from winchkit.runs.importing.formats.split_stamps import joined_stamps
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 from winchkit.runs.importing.unit_spelling import split_unit
 
 START = 1_700_000_000
@@ -27,12 +27,12 @@ SECONDS, NANOSECONDS = START + STEPS // 10**9, STEPS % 10**9
 TRUE = 7.3e-3 * np.arange(400)
 
 
-def table(columns: dict[str, np.ndarray]) -> Table:
+def table(columns: dict[str, np.ndarray]) -> ColumnTable:
     parts = [(*split_unit(name), values) for name, values in columns.items()]
-    return Table(
+    return ColumnTable(
         "log.csv",
         "text",
-        named_apart([Column(name, np.asarray(x, float), unit) for name, unit, x in parts]),
+        named_apart([FileColumn(name, np.asarray(x, float), unit) for name, unit, x in parts]),
     )
 
 

@@ -17,7 +17,7 @@ from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.can_bus import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
-from winchkit.sim.live.buses import Carried, Wire
+from winchkit.sim.live.buses import BusWire, Carried
 
 
 def test_time_advances_by_what_is_waited_for() -> None:
@@ -164,7 +164,7 @@ def test_a_frame_takes_its_bits(size: int) -> None:
     clock = SimulatedClock()
     arrived: list[float] = []
     bus = SimulatedCanBus(
-        clock, Wire(clock.now), 500_000, lambda _i, _d: arrived.append(clock.now())
+        clock, BusWire(clock.now), 500_000, lambda _i, _d: arrived.append(clock.now())
     )
     port = bus.connect()
     start = clock.now()
@@ -180,7 +180,7 @@ def test_a_frame_takes_its_bits(size: int) -> None:
 def test_the_lower_identifier_wins_the_bus() -> None:
     clock = SimulatedClock()
     heard: list[int] = []
-    bus = SimulatedCanBus(clock, Wire(clock.now), 1_000_000, lambda i, _d: heard.append(i))
+    bus = SimulatedCanBus(clock, BusWire(clock.now), 1_000_000, lambda i, _d: heard.append(i))
     port, other = bus.connect(), bus.connect()
     for identifier in (0x600, 0x181, 0x701, 0x080):
         port.transmit(identifier, b"")

@@ -19,7 +19,7 @@ from winchkit.errors import ConnectionLost
 from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.instruments.modbus import ModbusInstrument
-from winchkit.sim.instruments.modbus_line import ModbusLine
+from winchkit.sim.instruments.modbus_line import SimulatedModbusLine
 
 
 def spec(name: str) -> ModbusSpec:
@@ -38,7 +38,7 @@ class Line:
         length = spec("generic-length")
         fixed = replace(length, read=replace(length.read, fixed=True))
         self.length = ModbusInstrument(fixed, lambda: 2.5, now=0.0)
-        self.line = ModbusLine({1: self.cell, 2: self.length}, self.up_to_date)
+        self.line = SimulatedModbusLine({1: self.cell, 2: self.length}, self.up_to_date)
 
     @contextmanager
     def up_to_date(self) -> Iterator[None]:
@@ -140,6 +140,6 @@ def test_a_late_reply_comes_after_the_longest_reply_time(
 
 def test_a_taken_port_is_refused_and_nothing_stays(served: Line) -> None:
     host, port = served.line.address
-    other = ModbusLine({}, served.up_to_date, host=host, port=port)
+    other = SimulatedModbusLine({}, served.up_to_date, host=host, port=port)
     with pytest.raises(ConnectionLost, match=f"127.0.0.1:{port}"):
         other.start()

@@ -7,7 +7,7 @@ import pytest
 from stream_rig import stream
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.devices.stream import StreamSpec
-from winchkit.sim.instruments.stream import StreamInstrument, shown_by
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument, shown_by
 from winchkit.sim.instruments.stream_frames import IndicatorState, NumberStyle, Speech, style_of
 
 
@@ -92,7 +92,7 @@ def test_a_number_that_is_too_long_is_not_cut() -> None:
 
 
 def test_requests_are_found_among_garbage_and_in_pieces() -> None:
-    one = StreamInstrument(stream("flintec-ldu"), lambda: 1.0, now=0.0, address=2)
+    one = SimulatedStreamInstrument(stream("flintec-ldu"), lambda: 1.0, now=0.0, address=2)
     one.convert()
     one.show(1.0)
     for piece in (b"\x00xxG", b"N\r", b"\nOP 1\r\nGN\r\nOP 2\r", b"\nGN\r\n"):
@@ -101,7 +101,7 @@ def test_requests_are_found_among_garbage_and_in_pieces() -> None:
 
 
 def test_a_late_answer_comes_late() -> None:
-    one = StreamInstrument(stream("mettler-mt-sics"), lambda: 1.0, now=0.0)
+    one = SimulatedStreamInstrument(stream("mettler-mt-sics"), lambda: 1.0, now=0.0)
     one.inject("late reply")
     one.receive(b"SI\r\n", 1.0)
     assert one.take_output(1.3) == b""
@@ -109,7 +109,7 @@ def test_a_late_answer_comes_late() -> None:
 
 
 def test_an_unknown_fault_names_those_there_are() -> None:
-    one = StreamInstrument(stream("flintec-ldu"), lambda: 1.0, now=0.0)
+    one = SimulatedStreamInstrument(stream("flintec-ldu"), lambda: 1.0, now=0.0)
     with pytest.raises(UsageError, match=r"silence.*did you mean 'half line'"):
         one.inject("half lin")
 

@@ -16,7 +16,7 @@ from pymodbus.client import ModbusTcpClient
 
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NotPermitted, UsageError
-from winchkit.schema.programme import Step
+from winchkit.schema.programme import ProgrammeStep
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import FaultSpec, NoiseSpec, SimBench
 from winchkit.sim.live import buses
@@ -131,7 +131,7 @@ def test_what_turns_the_motor_moves_the_cable_and_the_instruments(
 
 
 def test_a_load_is_changed_at_rest_only(live: LiveBench, master: Master) -> None:
-    live.answer(Step(ask="hang the 20 kg load", load_mass=20.0))
+    live.answer(ProgrammeStep(ask="hang the 20 kg load", load_mass=20.0))
     wait_for(lambda: master.tension() == pytest.approx(196.13, abs=0.02))
     master.enable()
     master.node.sdo[0x60FF].raw = -300_000
@@ -226,14 +226,14 @@ def test_another_process_finds_the_simulation_beside_its_bench_file(
     ended = []
     assert not is_simulated(path)
     with ControlServer(live, path, lambda: ended.append(True)):
-        assert answer(path, Step(ask="hang it", load_mass=25.0))
+        assert answer(path, ProgrammeStep(ask="hang it", load_mass=25.0))
         assert live.winches["A"].plant.load_mass == 25
-        assert not answer(path, Step(ask="look at it"))
+        assert not answer(path, ProgrammeStep(ask="look at it"))
         with pytest.raises(DeviceRefused, match="unknown line 'dance'"):
             send(path, "dance")
         assert send(path, "quit") == "ending"
         assert ended
-    assert not answer(path, Step(ask="hang it", load_mass=25.0))
+    assert not answer(path, ProgrammeStep(ask="hang it", load_mass=25.0))
     address_file(path).write_text("127.0.0.1:1\n", encoding="utf-8")
     with pytest.raises(ConnectionLost, match="sim serve"):
         send(path, "status")

@@ -165,8 +165,8 @@ def test_every_number_can_be_written_and_read(name: str) -> None:
 
 def test_the_list_of_physics_says_what_each_is() -> None:
     rows = listed_physics()
-    assert [row["name"] for row in rows] == list(PHYSICS)
-    assert all(str(row["description"]).endswith(".") for row in rows)
+    assert [row.name for row in rows] == list(PHYSICS)
+    assert all(row.description.endswith(".") for row in rows)
 
 
 def test_memories_are_a_plants_own() -> None:

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from plant_benches import GROOVED, SPIRAL
 from winchkit.errors import UsageError
 from winchkit.schema.profiles.winch import CableSpec, DrumSpec
-from winchkit.sim.plant.drum import CLIMB, Drum, drum_of
+from winchkit.sim.plant.drum import CLIMB, PlantDrum, drum_of
 from winchkit.sim.plant.kinematics import Kinematics
 
 KINDS = {
@@ -24,7 +24,7 @@ KINDS = {
 angles = st.floats(0.0, 300.0)
 
 
-def law(kind: str, climb: float = 0.0) -> Drum:
+def law(kind: str, climb: float = 0.0) -> PlantDrum:
     return drum_of(replace(SPIRAL, drum=KINDS[kind]), climb)
 
 

@@ -8,14 +8,14 @@ import pytest
 from plant_benches import GROOVED, hide
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.sim.plant.plant import WinchPlant
-from winchkit.sim.plant.sensors import Measurement, Noise
+from winchkit.sim.plant.sensors import GaussianNoise, Measurement
 from winchkit.sim.plant.servo import DriveCommand
 
 COUNT = 40_000
 
 
 def samples(colour: float, interval: float = 0.02) -> np.ndarray:
-    noise = Noise(2.0, colour, 0.5, Random(7))
+    noise = GaussianNoise(2.0, colour, 0.5, Random(7))
     return np.array([noise.sample(interval) for _ in range(COUNT)])
 
 

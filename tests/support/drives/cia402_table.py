@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 
 STOPS = (
     RequestedState.RUN_DOWN,
@@ -14,9 +14,9 @@ STOPS = (
 """Wishes that must never energise a drive."""
 
 
-def transition(state: State, previous: int, word: int) -> int | None:
+def transition(state: DriveState, previous: int, word: int) -> int | None:
     """What the standard's command patterns (bits 7, 3 to 0) make of a word; 3 stands for 3 + 4."""
-    if state is State.FAULT:
+    if state is DriveState.FAULT:
         return 15 if word & 0x80 and not previous & 0x80 else None
     if word & 0x80:
         return None
@@ -24,15 +24,18 @@ def transition(state: State, previous: int, word: int) -> int | None:
     shutdown = word & 7 == 6
     switch_on, enable = word & 15 == 7, word & 15 == 15
     table = {
-        State.SWITCH_ON_DISABLED: [(shutdown, 2)],
-        State.READY_TO_SWITCH_ON: [(switch_on or enable, 3), (disable_voltage or quick_stop, 7)],
-        State.SWITCHED_ON: [(enable, 4), (shutdown, 6), (disable_voltage or quick_stop, 10)],
-        State.OPERATION_ENABLED: [
+        DriveState.SWITCH_ON_DISABLED: [(shutdown, 2)],
+        DriveState.READY_TO_SWITCH_ON: [
+            (switch_on or enable, 3),
+            (disable_voltage or quick_stop, 7),
+        ],
+        DriveState.SWITCHED_ON: [(enable, 4), (shutdown, 6), (disable_voltage or quick_stop, 10)],
+        DriveState.OPERATION_ENABLED: [
             (switch_on, 5),
             (shutdown, 8),
             (disable_voltage, 9),
             (quick_stop, 11),
         ],
-        State.QUICK_STOP_ACTIVE: [(disable_voltage, 12), (enable, 16)],
+        DriveState.QUICK_STOP_ACTIVE: [(disable_voltage, 12), (enable, 16)],
     }
     return next((number for applies, number in table.get(state, []) if applies), None)

@@ -14,19 +14,19 @@ from winchkit.bench.control.winch_state import WinchParts
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State, control_word
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState, control_word
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import LimitSpec
 
 CYCLE = 0.004
 _NEXT = {
-    (State.SWITCH_ON_DISABLED, 0x06): State.READY_TO_SWITCH_ON,
-    (State.READY_TO_SWITCH_ON, 0x07): State.SWITCHED_ON,
-    (State.SWITCHED_ON, 0x0F): State.OPERATION_ENABLED,
-    (State.FAULT, 0x80): State.SWITCH_ON_DISABLED,
-    (State.READY_TO_SWITCH_ON, 0x02): State.SWITCH_ON_DISABLED,
-    (State.SWITCHED_ON, 0x02): State.SWITCH_ON_DISABLED,
+    (DriveState.SWITCH_ON_DISABLED, 0x06): DriveState.READY_TO_SWITCH_ON,
+    (DriveState.READY_TO_SWITCH_ON, 0x07): DriveState.SWITCHED_ON,
+    (DriveState.SWITCHED_ON, 0x0F): DriveState.OPERATION_ENABLED,
+    (DriveState.FAULT, 0x80): DriveState.SWITCH_ON_DISABLED,
+    (DriveState.READY_TO_SWITCH_ON, 0x02): DriveState.SWITCH_ON_DISABLED,
+    (DriveState.SWITCHED_ON, 0x02): DriveState.SWITCH_ON_DISABLED,
 }
 _STOPPING_RATE = 50.0
 
@@ -51,7 +51,7 @@ class FakeAxis:
     position_mode: bool = False
     angle: float = 0.0
     velocity: float = 0.0
-    state: State = State.SWITCH_ON_DISABLED
+    state: DriveState = DriveState.SWITCH_ON_DISABLED
     words: list[int] = field(default_factory=list)
     heartbeat: HeartbeatConsumer = field(default_factory=lambda: HeartbeatConsumer(0.2))
     operational: bool = True
@@ -71,7 +71,7 @@ class FakeAxis:
     sdo_refused: bool = False
     last_request_elsewhere: float = -math.inf
     control_words_elsewhere: int = 0
-    sdo_state: State | None = None
+    sdo_state: DriveState | None = None
     sdo_stops: int = 0
     torque: float = 0.0
     lag: float = 0.0
@@ -113,12 +113,12 @@ class FakeAxis:
             self._sync = (sync, now)
             return
         self.heartbeat.receive(b"\x05", now)
-        if self.state is State.QUICK_STOP_ACTIVE:
+        if self.state is DriveState.QUICK_STOP_ACTIVE:
             change = _STOPPING_RATE * step
             self.velocity -= math.copysign(min(change, abs(self.velocity)), self.velocity)
             if self.velocity == 0:
-                self.state = State.SWITCH_ON_DISABLED
-        elif self.state is not State.OPERATION_ENABLED:
+                self.state = DriveState.SWITCH_ON_DISABLED
+        elif self.state is not DriveState.OPERATION_ENABLED:
             self.velocity = 0.0
         elif self.lag:
             self.velocity += (self._target - self.velocity) * -math.expm1(-step / self.lag)
@@ -146,10 +146,10 @@ class FakeAxis:
         self.words.append(word)
         if not self.alive or not self.hears_pdos:
             return word
-        if word == 0x02 and self.state is State.OPERATION_ENABLED:
-            self.state = State.QUICK_STOP_ACTIVE
+        if word == 0x02 and self.state is DriveState.OPERATION_ENABLED:
+            self.state = DriveState.QUICK_STOP_ACTIVE
         self.state = _NEXT.get((self.state, word), self.state)
-        if self.state is State.OPERATION_ENABLED and word & 0x0F == 0x0F:
+        if self.state is DriveState.OPERATION_ENABLED and word & 0x0F == 0x0F:
             self._target = velocity
             self.velocity = velocity if not self.lag else self.velocity
             if self.position_mode and angle is not None:
@@ -162,8 +162,8 @@ class FakeAxis:
         if self.hears_sdos:
             if self.sdo_stops > 1:
                 self.sdo_state = self.state
-            if self.state is State.OPERATION_ENABLED:
-                self.state = State.QUICK_STOP_ACTIVE
+            if self.state is DriveState.OPERATION_ENABLED:
+                self.state = DriveState.QUICK_STOP_ACTIVE
 
     def stop_by_nmt(self) -> None:
         raise AssertionError("it was not seen to leave operation enabled on that")
@@ -174,8 +174,8 @@ class FakeAxis:
     def emergency_stop(self, *, sdo: bool) -> None:
         """Prepared frames: no feedback is needed."""
         self.words.append(0x02)
-        if self.hears_pdos and self.state is State.OPERATION_ENABLED:
-            self.state = State.QUICK_STOP_ACTIVE
+        if self.hears_pdos and self.state is DriveState.OPERATION_ENABLED:
+            self.state = DriveState.QUICK_STOP_ACTIVE
         if sdo:
             self.stop_by_sdo()
 
@@ -205,12 +205,12 @@ class FakeBus:
 class FakeCell:
     """A load cell whose value and time a test sets."""
 
-    latest: Reading | None = None
+    latest: InstrumentReading | None = None
     problem: ConnectionLost | None = None
     max_age: float = 0.25
 
     def read(self, value: float, now: float, quality: Quality = Quality.GOOD) -> None:
-        self.latest = Reading(value, value, value, quality, now, now, now, 0.0)
+        self.latest = InstrumentReading(value, value, value, quality, now, now, now, 0.0)
 
 
 class Rig:

@@ -22,14 +22,14 @@ from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
 from winchkit.drivers.can.cia402.limits import DriveLimits
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.state_machine import RequestedState
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import PdoSpec
 
 NODE = 1
 CYCLE = 0.004
-SCALE = Scale(angle=1e-3, velocity=1e-3, torque=1e-2)
+SCALE = CountScale(angle=1e-3, velocity=1e-3, torque=1e-2)
 ALL_MODES = ("PP", "PV", "PT", "HM", "IP", "CSP", "CSV", "CST")
 _SIZES = {
     0x6040: (16, False),

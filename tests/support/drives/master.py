@@ -13,7 +13,7 @@ from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.read import read_device
 
@@ -48,8 +48,8 @@ class Master:
         self.bus.close()
 
     @property
-    def state(self) -> State:
-        return State.UNKNOWN if self.axis.feedback is None else self.axis.feedback.state
+    def state(self) -> DriveState:
+        return DriveState.UNKNOWN if self.axis.feedback is None else self.axis.feedback.state
 
     def commission(self) -> Commissioned:
         """Commission the drive and receive its first feedback."""
@@ -76,7 +76,7 @@ class Master:
             self._sync()
             self.axis.send(requested, velocity=velocity)
 
-    def until(self, requested: RequestedState, state: State) -> None:
+    def until(self, requested: RequestedState, state: DriveState) -> None:
         """Cycles until the feedback says that the drive is in a state."""
         for _ in range(_PATIENCE):
             self.cycles(requested, 1)

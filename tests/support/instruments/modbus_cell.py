@@ -11,7 +11,7 @@ from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.reading import InstrumentReading
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.read import read_device
@@ -51,7 +51,7 @@ def until(condition: Callable[[], bool], within: float = 3.0) -> None:
         time.sleep(0.005)
 
 
-def collected(instrument: Instrument) -> list[Reading]:
-    readings: list[Reading] = []
+def collected(instrument: Instrument) -> list[InstrumentReading]:
+    readings: list[InstrumentReading] = []
     instrument.listeners.append(readings.append)
     return readings

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from random import Random
 
 from stream_rig import Rig, device
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.reading import InstrumentReading
 
 RAMP = 0.5
 """Of the truth, N/s: a value identifies its time."""
@@ -115,7 +115,7 @@ def _ramp(time: float) -> float:
     return RAMP * (time - 90.0)
 
 
-def _is_wrong(name: str, one: Reading) -> bool:
+def _is_wrong(name: str, one: InstrumentReading) -> bool:
     if not one.quality.usable:
         return one.value == one.value
     age = RAMP * (one.t_uncertainty + 3e-3)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import cache
 
 from winchkit.catalog import find
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.reading import InstrumentReading
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.line import StreamLine
 from winchkit.drivers.stream.port import Chunk
@@ -18,7 +18,7 @@ from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.stream import StreamSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.instruments.stream import StreamInstrument as SimInstrument
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument as SimInstrument
 from winchkit.sim.instruments.stream import shown_by
 
 DEVICES = (
@@ -135,7 +135,7 @@ class Rig:
             StreamInstrument(one.name, one, address, self.clock, rate=100.0, timeout=TIMEOUT)
             for one, address in zip(devices, addresses, strict=False)
         )
-        self.readings: list[Reading] = []
+        self.readings: list[InstrumentReading] = []
         self.instrument.listeners.append(self.readings.append)
         spec = BusSpec("serial", port="simulated", timeout=TIMEOUT)
         self.line = StreamLine(
@@ -195,7 +195,7 @@ class Rig:
         self.events.append((self.clock.time + after, action))
         self.events.sort(key=lambda event: event[0])
 
-    def run(self, duration: float) -> list[Reading]:
+    def run(self, duration: float) -> list[InstrumentReading]:
         """Serve for a time; the readings of the first instrument in it."""
         first = len(self.readings)
         self.end = self.clock.time + duration

@@ -15,7 +15,7 @@ import numpy as np
 from robot_poses.truth import Noise, Row, Truth, csv, poses
 from winchkit.catalog import find
 from winchkit.robot import Robot, robot_of
-from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.runs import read_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
@@ -60,7 +60,7 @@ def elastic_rows(count: int, seed: int, noise: Noise | None = None) -> tuple[Row
     return tuple(poses(ELASTIC, count, seed, noise=noise, tension=pull))
 
 
-def measured(*texts: str) -> Measured:
+def measured(*texts: str) -> MeasuredPoses:
     """Runs' texts as the poses that are read from them."""
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / f"poses-{number}.csv" for number in range(len(texts))]
@@ -69,7 +69,7 @@ def measured(*texts: str) -> Measured:
         return read_poses([read_run(path) for path in paths], robot().profile)
 
 
-def held() -> Measured:
+def held() -> MeasuredPoses:
     """Poses without any noise, to judge by."""
     return measured(csv(rows(40, 99, noise=EXACT), angles=True))
 

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 WRAPS = (pi / 2, pi, pi / 3)
 
@@ -23,7 +23,7 @@ def cell_readings(
 ) -> np.ndarray:
     """Tension at the drum over time, from the platform's and the cable wound in."""
     pulleys = PreslidingPulleys(friction, stiffness, shape)
-    state, out = State(), []
+    state, out = PlantState(), []
     for load, moved in zip(platform, np.diff(wound, prepend=wound[0]), strict=True):
         state.winding_speed = float(moved)
         tension = float(load)

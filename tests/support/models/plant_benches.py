@@ -15,7 +15,7 @@ from winchkit.schema.profiles.winch import (
     ReferenceSpec,
     WinchProfile,
 )
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.simbench import HiddenSpec, NoiseSpec, SimBench, WinchTruth
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand
@@ -78,5 +78,5 @@ def bench(**changes: object) -> SimBench:
     return replace(simulated, **changes)
 
 
-def programme(*steps: Step, repeat: int = 1) -> Programme:
+def programme(*steps: ProgrammeStep, repeat: int = 1) -> Programme:
     return Programme("try", steps, repeat)

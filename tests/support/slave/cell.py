@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from slave.rig import Rig
 from winchkit.bench.bench import Bench
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import ConnectionLost
 
 
@@ -22,7 +22,7 @@ class Cell:
     max_age: float = 0.3
     silent: bool = False
     quality: Quality = Quality.GOOD
-    latest: Reading | None = None
+    latest: InstrumentReading | None = None
     problem: ConnectionLost | None = None
     tared: bool | None = None
     _next: float = 0.0
@@ -40,4 +40,4 @@ class Cell:
             return
         self._next = now + self.period
         value = self.tension() if self.quality.usable else float("nan")
-        self.latest = Reading(value, value, value, self.quality, now, now, now, 1e-3)
+        self.latest = InstrumentReading(value, value, value, self.quality, now, now, now, 1e-3)

@@ -24,7 +24,7 @@ from winchkit.catalog import find
 from winchkit.errors import FileError, NotPermitted, UsageError, WinchkitError
 from winchkit.runs.read import read_run
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.programme import Programme, Step, write_programme
+from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.web.application import _refused
 from winchkit.web.bench.browser import Browser, Inbox
@@ -121,7 +121,11 @@ def test_a_programme_is_planned_in_closed_form_and_compared_with_the_limits(
     work = tmp_path / "work"
     work.mkdir()
     programmes = Programmes(spec, tmp_path, work)
-    steps = (Step(to=3.0, speed=0.1, acceleration=0.5), Step(ask="look"), Step(hold=2.0))
+    steps = (
+        ProgrammeStep(to=3.0, speed=0.1, acceleration=0.5),
+        ProgrammeStep(ask="look"),
+        ProgrammeStep(hold=2.0),
+    )
     write_programme(Programme("own", steps), work / "own.toml")
     (work / "other.toml").write_text("no = 'programme'")
     found = programmes.preview("own.toml", {"A": 4.0})

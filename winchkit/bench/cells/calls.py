@@ -10,13 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.bench.cells.desk import check_permanent, full_name
+from winchkit.bench.cells.results import (
+    CellInfo,
+    CellRate,
+    CellTare,
+    CellTares,
+    CellTiming,
+    CellValue,
+)
 from winchkit.bench.cells.tasks import readings_of
 from winchkit.bench.remote.cell_session import at_cells
-from winchkit.calibration.cell.health import Health, Samples, examine, samples_of
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.calibration.cell.health import CellSamples, Health, examine, samples_of
+from winchkit.drivers.reading import InstrumentReading, Quality
 
 
-def cell_info(bench: str | Path, cell: str | None = None) -> dict[str, Any]:
+def cell_info(bench: str | Path, cell: str | None = None) -> CellInfo:
     """Return device file, serial number, calibration, tare, and a reading of a load cell.
 
     Parameters
@@ -28,7 +36,7 @@ def cell_info(bench: str | Path, cell: str | None = None) -> dict[str, Any]:
 
     Returns
     -------
-    dict
+    CellInfo
         What ``winchkit cell info --json`` prints.
 
     Raises
@@ -40,12 +48,14 @@ def cell_info(bench: str | Path, cell: str | None = None) -> dict[str, Any]:
     UsageError
         For an unknown instrument.
     """
-    return _done("about", bench, cell)
+    told = _done("about", bench, cell)
+    parts = {"tare": CellTares, "reading": CellValue, "timing": CellTiming}
+    made = {key: kind(**told[key]) for key, kind in parts.items()}
+    lists = {key: tuple(told[key]) for key in ("coefficients", "remarks")}
+    return CellInfo(**{**told, **made, **lists})
 
 
-def cell_rate(
-    bench: str | Path, cell: str | None = None, *, duration: float = 3.0
-) -> dict[str, Any]:
+def cell_rate(bench: str | Path, cell: str | None = None, *, duration: float = 3.0) -> CellRate:
     """Measure the rate of a load cell, and what limits it.
 
     Parameters
@@ -57,10 +67,10 @@ def cell_rate(
 
     Returns
     -------
-    dict
+    CellRate
         What ``winchkit cell rate --json`` prints.
     """
-    return _done("rate", bench, cell, duration)
+    return CellRate(**_done("rate", bench, cell, duration))
 
 
 def cell_health(bench: str | Path, cell: str | None = None, *, duration: float = 10.0) -> Health:
@@ -93,7 +103,7 @@ def cell_tare(
     duration: float = 1.0,
     device: bool = False,
     clear: bool = False,
-) -> dict[str, Any]:
+) -> CellTare:
     """Tare a load cell: subtract the mean of its present reading.
 
     Parameters
@@ -109,7 +119,7 @@ def cell_tare(
 
     Returns
     -------
-    dict
+    CellTare
         What ``winchkit cell tare --json`` prints.
 
     Raises
@@ -118,12 +128,10 @@ def cell_tare(
         Where the winch moves.
     """
     task = f"{'clear ' * clear}{'device tare' if device else 'tare' if clear else 'host tare'}"
-    return _done(task, bench, cell, *() if task == "clear tare" else (duration,))
+    return CellTare(**_done(task, bench, cell, *() if task == "clear tare" else (duration,)))
 
 
-def cell_zero(
-    bench: str | Path, cell: str | None = None, *, duration: float = 1.0
-) -> dict[str, Any]:
+def cell_zero(bench: str | Path, cell: str | None = None, *, duration: float = 1.0) -> CellTare:
     """Send a load cell's device its volatile zero command.
 
     Parameters
@@ -133,10 +141,10 @@ def cell_zero(
 
     Returns
     -------
-    dict
+    CellTare
         What ``winchkit cell zero --json`` prints.
     """
-    return _done("zero", bench, cell, duration)
+    return CellTare(**_done("zero", bench, cell, duration))
 
 
 def cell_store(bench: str | Path, command: str, cell: str | None = None) -> None:
@@ -160,7 +168,7 @@ def _done(task: str, bench: str | Path, cell: str | None, *arguments: Any) -> di
         return found.do(task, full_name(found.spec, cell), *arguments)
 
 
-def samples_of_readings(readings: Sequence[Reading]) -> Samples:
+def samples_of_readings(readings: Sequence[InstrumentReading]) -> CellSamples:
     """Readings as the examination of a cell takes them."""
     saturated = Quality.OVERLOAD | Quality.UNDERLOAD
     return samples_of(

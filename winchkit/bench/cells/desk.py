@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 from winchkit.bench.cells.instruments import device_of, refs_of
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.publisher import HostScale, InstrumentReadings, Publisher
-from winchkit.drivers.reading import Reading, Sensor
+from winchkit.drivers.reading import InstrumentReading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import NoReply, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, DeviceRef
@@ -153,7 +153,7 @@ class CellDesk:
         """Identity of the device; raises NoReply, DeviceRefused."""
         return self._slow.identify(self.sensors[name])
 
-    def first_reading(self, name: str) -> Reading:
+    def first_reading(self, name: str) -> InstrumentReading:
         """Wait for a reading; raises what keeps it from coming."""
         sensor = self.sensors[name]
         deadline = self.clock.now() + _FIRST_READING
@@ -165,13 +165,13 @@ class CellDesk:
             self.clock.sleep(_POLL)
         return sensor.latest
 
-    def readings(self, name: str, duration: float) -> list[Reading]:
+    def readings(self, name: str, duration: float) -> list[InstrumentReading]:
         """Every reading of the next ``duration`` s, longer where they are few.
 
         Raises what keeps them from coming.
         """
         self.first_reading(name)
-        sensor, taken = self.sensors[name], list[Reading]()
+        sensor, taken = self.sensors[name], list[InstrumentReading]()
         end = self.clock.now() + duration
         sensor.listeners.append(taken.append)
         try:
@@ -214,18 +214,18 @@ def check_permanent(spec: BenchSpec, name: str, wanted: str) -> None:
         )
 
 
-def steady(readings: Sequence[Reading]) -> Steady:
+def steady(readings: Sequence[InstrumentReading]) -> Steady:
     """The mean of usable readings' net values; raises NotPermitted where too many are none."""
     return _mean(readings, [item.value for item in readings if item.quality.usable])
 
 
-def indicated(readings: Sequence[Reading], scale: HostScale) -> Steady:
+def indicated(readings: Sequence[InstrumentReading], scale: HostScale) -> Steady:
     """The mean of the gross value that the device itself shows, the host's calibration undone."""
     shown = [scale.indicated(item.gross) for item in readings if item.quality.usable]
     return _mean(readings, shown)
 
 
-def _mean(readings: Sequence[Reading], values: Sequence[float]) -> Steady:
+def _mean(readings: Sequence[InstrumentReading], values: Sequence[float]) -> Steady:
     if len(values) < max(_BATCHES, len(readings) // 2):
         flags = {str(item.quality) for item in readings if not item.quality.usable}
         raise NotPermitted(

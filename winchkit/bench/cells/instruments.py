@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from winchkit import catalog
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.instrument_process.process import InstrumentSpec, LineSpec, line_of
+from winchkit.drivers.instrument_process.process import LineInstrument, ProcessLineSpec, line_of
 from winchkit.drivers.publisher import HostScale, Publisher
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowLine
@@ -170,14 +170,14 @@ def _spoken(ref: DeviceRef) -> str:
     return "" if ref.unit is None else f" unit {ref.unit}"
 
 
-def _declared(spec: BenchSpec, bus: str, wired: list[_Wired]) -> LineSpec:
+def _declared(spec: BenchSpec, bus: str, wired: list[_Wired]) -> ProcessLineSpec:
     """The Modbus or serial line of a bus with its instruments, in the order of ``wired``."""
     table = "stream" if spec.bus[bus].kind == "serial" else "modbus"
     instruments = tuple(
-        InstrumentSpec(one.label, _of_kind(spec, one, table), one.ref.unit, one.ref.rate)
+        LineInstrument(one.label, _of_kind(spec, one, table), one.ref.unit, one.ref.rate)
         for one in wired
     )
-    return LineSpec(bus, spec.bus[bus], instruments)
+    return ProcessLineSpec(bus, spec.bus[bus], instruments)
 
 
 def _can_line(

@@ -17,12 +17,12 @@ from winchkit.bench.cells.tares import (
     restore_tares,
     tares_now,
 )
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
 
-class Cells(Protocol):
+class BenchCells(Protocol):
     """The instruments of a bench, here or at its owner."""
 
     spec: BenchSpec
@@ -49,9 +49,12 @@ def do(desk: CellDesk, task: str, name: str, *arguments: Any) -> dict[str, Any]:
     return TASKS[task](desk, full_name(desk.spec, name), *arguments)
 
 
-def readings_of(reply: Mapping[str, Any]) -> list[Reading]:
+def readings_of(reply: Mapping[str, Any]) -> list[InstrumentReading]:
     """Readings in a reply of the task "watch"."""
-    return [Reading(**{**row, "quality": Quality(row["quality"])}) for row in reply["readings"]]
+    return [
+        InstrumentReading(**{**row, "quality": Quality(row["quality"])})
+        for row in reply["readings"]
+    ]
 
 
 def _identify(desk: CellDesk, name: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import statistics
 from dataclasses import dataclass, replace
 
 from winchkit.bench.bench import Bench
-from winchkit.bench.control.motion import Move
+from winchkit.bench.control.motion import PlannedMove
 from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.direction import directed
 from winchkit.errors import NotPermitted
@@ -90,7 +90,7 @@ class Motions:
         limits = winch.wiring.limits
         speed = min(self._speed, limits.speed_unhomed) or self._speed
         target = winch.cable.cable_length(angle) + change
-        move = Move(winch.cable, replace(limits, length=None), target, speed=speed)
+        move = PlannedMove(winch.cable, replace(limits, length=None), target, speed=speed)
         winch.permit(Direction.PAY_OUT if change > 0 else Direction.WIND_IN)
         move.prepare(angle)
         winch.begin(move)

@@ -28,17 +28,17 @@ from winchkit.bench.commissioning.dialogue import (
 )
 from winchkit.bench.commissioning.motions import Motions
 from winchkit.bench.commissioning.record import (
+    CommissioningRecord,
     Confirmation,
     DriveRecord,
     FileHash,
     HostLossRecord,
-    Record,
     WinchRecord,
     drive_record,
     hash_of,
     write_record,
 )
-from winchkit.bench.commissioning.trial import Trial, Trials
+from winchkit.bench.commissioning.trial import TrialResult, Trials
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
@@ -67,7 +67,7 @@ _LIMITS = (
 )
 
 
-def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Record:
+def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> CommissioningRecord:
     """Lead through every item and write the record beside the bench file; returns it.
 
     Raises NotPermitted for what was not confirmed or did not stop, and every error of opening.
@@ -101,7 +101,7 @@ def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Recor
         for step in steps.values():
             step.motions(bench)
     confirm(dialogue, "sign", f"Everything above is right; sign the record as {by}?")
-    record = Record(
+    record = CommissioningRecord(
         bench=spec.name,
         date=_now(),
         by=by,
@@ -223,7 +223,7 @@ class _Steps:
         held = confirm(self._dialogue, f"{self._name}.brake_held", f"{text} The brake held?")
         self._note("brake", f"{question} {text}", f"{answer}, {held}", slip=seen.travel)
 
-    def _host_silent(self, trials: Trials, speed: float) -> Trial:
+    def _host_silent(self, trials: Trials, speed: float) -> TrialResult:
         where = f"in motion at {speed:g} m/s" if speed else "at standstill"
         seen = trials.host_loss(self._name, speed)
         if not seen.stopped:
@@ -242,7 +242,7 @@ class _Steps:
         self._note(item, text, answer, after=seen.after, travel=seen.travel)
         return seen
 
-    def _moving(self, trials: Trials) -> Trial | None:
+    def _moving(self, trials: Trials) -> TrialResult | None:
         speed = _slow(self._wiring)
         question = (
             f"winch {self._name}: try the loss of the host in a slow move, winding in at "
@@ -368,7 +368,7 @@ def _software() -> Mapping[str, str]:
     return found
 
 
-def commission(bench: str | Path, answers: str | Path | None = None) -> Record:
+def commission(bench: str | Path, answers: str | Path | None = None) -> CommissioningRecord:
     """Commission a bench: try directions, units, brake, limits and the loss of the host.
 
     Parameters
@@ -380,7 +380,7 @@ def commission(bench: str | Path, answers: str | Path | None = None) -> Record:
 
     Returns
     -------
-    Record
+    CommissioningRecord
         Tests, confirmations, and the person who confirmed them.
 
     Raises

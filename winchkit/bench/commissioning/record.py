@@ -92,7 +92,7 @@ class WinchRecord:
 
 
 @dataclass(frozen=True)
-class Record:
+class CommissioningRecord:
     """A bench as it was commissioned."""
 
     bench: str
@@ -115,7 +115,7 @@ def hash_of(path: str | Path) -> FileHash:
     return FileHash(Path(path).name, digest)
 
 
-def write_record(record: Record, path: str | Path) -> None:
+def write_record(record: CommissioningRecord, path: str | Path) -> None:
     """Write it whole or not at all; raises NotPermitted."""
     text = json.dumps({"schema": SCHEMA, **dataclasses.asdict(record)}, indent=1) + "\n"
     draft = Path(f"{path}.{os.getpid()}")
@@ -130,7 +130,7 @@ def write_record(record: Record, path: str | Path) -> None:
         raise NotPermitted(f"{path}: the record cannot be written: {error.strerror}") from error
 
 
-def read_record(path: str | Path) -> Record | None:
+def read_record(path: str | Path) -> CommissioningRecord | None:
     """The record; None where there is none. Raises FileError for one that cannot be used."""
     try:
         text = read_text(path)
@@ -143,7 +143,7 @@ def read_record(path: str | Path) -> Record | None:
         schema = tree.pop("schema")
         winches = {name: _winch(one) for name, one in tree.pop("winch").items()}
         bench_file = FileHash(**tree.pop("bench_file"))
-        record = Record(**tree, bench_file=bench_file, winch=winches)
+        record = CommissioningRecord(**tree, bench_file=bench_file, winch=winches)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise FileError(f"{path}: holds no commissioning record: {error}") from error
     if schema != SCHEMA:
@@ -263,7 +263,9 @@ def _virtual(bus: BusSpec) -> bool:
     return bus.interface == "socketcan" and (bus.channel or "").startswith(_VIRTUAL_CAN)
 
 
-def _stale(spec: BenchSpec, record: Record, drives: Mapping[str, DriveRecord]) -> Iterator[str]:
+def _stale(
+    spec: BenchSpec, record: CommissioningRecord, drives: Mapping[str, DriveRecord]
+) -> Iterator[str]:
     yield from _changed("the bench file", record.bench_file, spec.path)
     for name in spec.winch:
         if name not in record.winch:

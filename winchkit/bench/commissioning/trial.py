@@ -23,8 +23,8 @@ from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import (
     DISABLE_VOLTAGE,
     QUICK_STOP,
+    DriveState,
     RequestedState,
-    State,
     state_of,
 )
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
@@ -63,7 +63,7 @@ _HALF = 1 << 31
 
 
 @dataclass(frozen=True)
-class Trial:
+class TrialResult:
     """Result of one trial."""
 
     stopped: bool
@@ -122,7 +122,7 @@ class Trials:
         found = {name: axis.keep_position(closed=axis.at_rest) for name, axis in axes.items()}
         self._positions.close_with({name: kept for name, kept in found.items() if kept is not None})
 
-    def host_loss(self, name: str, speed: float = 0.0) -> Trial:
+    def host_loss(self, name: str, speed: float = 0.0) -> TrialResult:
         """Fall silent with the drive enabled, at rest or winding in at ``speed`` (m/s)."""
         with self._ended(name) as axis:
             self._enable(axis)
@@ -138,7 +138,7 @@ class Trials:
             if stopped:
                 self._await_rest(axis)
             travel = self._travel(name, axis, angle)
-        return Trial(stopped, after, str(state), travel)
+        return TrialResult(stopped, after, str(state), travel)
 
     def room(self, name: str) -> str:
         """Warning that no length limit is kept in a trial in motion; empty where it is."""
@@ -146,7 +146,7 @@ class Trials:
             return ""
         return " The cable length is not known, and limits.length not kept: look for room yourself."
 
-    def nmt_stopped(self, name: str) -> Trial:
+    def nmt_stopped(self, name: str) -> TrialResult:
         """NMT stopped with the drive enabled at rest; every other life sign goes on."""
         with self._ended(name) as axis:
             self._enable(axis)
@@ -158,9 +158,9 @@ class Trials:
             axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start
-        return Trial(_has_left(state), after, str(state))
+        return TrialResult(_has_left(state), after, str(state))
 
-    def brake(self, name: str) -> Trial:
+    def brake(self, name: str) -> TrialResult:
         """Enable the drive at rest, disable it, and see whether the cable moves after that."""
         with self._ended(name) as axis:
             self._enable(axis)
@@ -170,7 +170,7 @@ class Trials:
                 self._cycle(axis, RequestedState.DISABLE)
             travel = self._travel(name, axis, angle)
             state = _asked(axis)
-        return Trial(_has_left(state), _BRAKE_TIME, str(state), travel)
+        return TrialResult(_has_left(state), _BRAKE_TIME, str(state), travel)
 
     @contextmanager
     def _ended(self, name: str) -> Iterator[Cia402Axis]:
@@ -209,7 +209,7 @@ class Trials:
         node = axis.objects
         # A drive that stopped (1029h:1 = 2, NMT stopped) answers SDO only when pre-operational.
         node.bus.nmt(_PRE_OPERATIONAL, node.node)
-        if state_of(node.read(0x6041)) is State.OPERATION_ENABLED:
+        if state_of(node.read(0x6041)) is DriveState.OPERATION_ENABLED:
             node.write(0x6040, 0, QUICK_STOP)
         self._await_rest(axis)
         for one in self.axes.values():
@@ -223,7 +223,7 @@ class Trials:
 
     def _enable(self, axis: Cia402Axis) -> None:
         deadline = self._clock.now() + _ENABLE_TIME
-        while axis.state is not State.OPERATION_ENABLED:
+        while axis.state is not DriveState.OPERATION_ENABLED:
             self._cycle(axis, RequestedState.ENABLE)
             if self._clock.now() > deadline:
                 raise NotPermitted(
@@ -291,7 +291,7 @@ class Trials:
 
     def _left(
         self, axis: Cia402Axis, start: float, blind: float, timeout: float
-    ) -> tuple[State, float]:
+    ) -> tuple[DriveState, float]:
         """The first state that is known and not operation enabled, and when; or the last one."""
         self._clock.sleep(blind)
         while True:
@@ -303,7 +303,7 @@ class Trials:
 
     def _await_rest(self, axis: Cia402Axis) -> None:
         deadline = self._clock.now() + _REST_TIME
-        while _asked(axis) in (State.FAULT_REACTION_ACTIVE, State.QUICK_STOP_ACTIVE):
+        while _asked(axis) in (DriveState.FAULT_REACTION_ACTIVE, DriveState.QUICK_STOP_ACTIVE):
             if not axis.objects.read_if_there(0x606C):
                 return
             if self._clock.now() > deadline:
@@ -332,12 +332,12 @@ def _timeout(mechanism: Mechanism) -> float:
     return _HARDWARE_TIMEOUT if nothing else mechanism.limit + _TIMEOUT
 
 
-def _has_left(state: State) -> bool:
+def _has_left(state: DriveState) -> bool:
     """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
-    return state not in (State.OPERATION_ENABLED, State.UNKNOWN)
+    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
-def _asked(axis: Cia402Axis) -> State:
+def _asked(axis: Cia402Axis) -> DriveState:
     """Power state by SDO; a drive whose network state is stopped has to leave that first."""
     node = axis.objects
     try:

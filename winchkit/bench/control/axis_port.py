@@ -7,7 +7,7 @@ from typing import Protocol
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 
 
 class AxisPort(Protocol):
@@ -92,7 +92,7 @@ class AxisPort(Protocol):
         """Whether it aborted the present stop by SDO."""
 
     @property
-    def sdo_state(self) -> State | None:
+    def sdo_state(self) -> DriveState | None:
         """Power state read by SDO since that stop began."""
 
     def keep_position(self, *, closed: bool) -> KeptPosition | None:

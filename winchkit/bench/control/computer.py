@@ -28,7 +28,7 @@ _THROTTLED = 0.95
 
 
 @dataclass(frozen=True)
-class Item:
+class ComputerSetting:
     """One setting, whether the control loop can use it, and how to change it."""
 
     name: str
@@ -43,23 +43,25 @@ class Item:
         return f"{self.name}: {self.detail}" + (f"; {self.remedy}" if self.remedy else "")
 
 
-def survey() -> tuple[Item, ...]:
+def survey() -> tuple[ComputerSetting, ...]:
     """Real-time settings that a control loop would get on this computer with this account."""
     if sys.platform != "linux":
-        return (Item("real-time", False, f"not available on {sys.platform}", "use Linux"),)
+        return (
+            ComputerSetting("real-time", False, f"not available on {sys.platform}", "use Linux"),
+        )
     return (_scheduling(), _memory(), *_kernel())
 
 
-def instrument_reading(*, scheduled: bool) -> Item:
+def instrument_reading(*, scheduled: bool) -> ComputerSetting:
     """Process that reads the instruments of Modbus and serial lines, with real time requested."""
     process = "Modbus and serial lines are read by the instrument process"
     if scheduled:
-        return Item("instruments", True, f"{process}, with real-time priority")
+        return ComputerSetting("instruments", True, f"{process}, with real-time priority")
     detail = (
         f"{process}, without real-time priority: other programs delay its readings, and a winch "
         "whose load cell is read too late trips"
     )
-    return Item("instruments", False, detail, scheduling_remedy())
+    return ComputerSetting("instruments", False, detail, scheduling_remedy())
 
 
 def scheduling_remedy() -> str:
@@ -99,7 +101,7 @@ def locks_without_limit(hard: int) -> bool:
     return hard == resource.RLIM_INFINITY or bool(effective >> _CAPABILITY_LOCK & 1)
 
 
-def _scheduling() -> Item:
+def _scheduling() -> ComputerSetting:
     """Set the priority of a thread made for this test."""
     refusals: list[OSError] = []
 
@@ -113,34 +115,36 @@ def _scheduling() -> Item:
     thread.start()
     thread.join()
     if not refusals:
-        return Item("scheduling", True, f"SCHED_FIFO with priority {PRIORITY} is permitted")
+        return ComputerSetting(
+            "scheduling", True, f"SCHED_FIFO with priority {PRIORITY} is permitted"
+        )
     detail = f"SCHED_FIFO with priority {PRIORITY} is refused ({refusals[0].strerror})"
-    return Item("scheduling", False, detail, scheduling_remedy())
+    return ComputerSetting("scheduling", False, detail, scheduling_remedy())
 
 
-def _memory() -> Item:
+def _memory() -> ComputerSetting:
     """By limit and capability: locking the memory of this process only to see would cost time."""
     import resource
 
     hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1]
     if locks_without_limit(hard):
-        return Item("memory", True, "may be locked")
+        return ComputerSetting("memory", True, "may be locked")
     used = int((_status("VmSize") or "0").split()[0]) * 1024
     detail = f"may be locked up to {hard / 2**20:.0f} MB"
     if used < hard:
-        return Item("memory", True, detail)
-    return Item(
+        return ComputerSetting("memory", True, detail)
+    return ComputerSetting(
         "memory", False, f"{detail}, this process has {used / 2**20:.0f} MB", memory_remedy()
     )
 
 
-def _kernel() -> tuple[Item, ...]:
+def _kernel() -> tuple[ComputerSetting, ...]:
     """Settings of the kernel that hold back real-time threads or slow the processor down."""
     found = []
     preemption = _preemption()
     if preemption in ("none", "voluntary", "lazy"):
         found.append(
-            Item(
+            ComputerSetting(
                 "kernel preemption",
                 False,
                 f"{preemption}: a system call of another program delays the control loop by "
@@ -149,7 +153,7 @@ def _kernel() -> tuple[Item, ...]:
             )
         )
     elif preemption:
-        found.append(Item("kernel preemption", True, preemption))
+        found.append(ComputerSetting("kernel preemption", True, preemption))
     runtime = _number("/proc/sys/kernel/sched_rt_runtime_us")
     period = _number("/proc/sys/kernel/sched_rt_period_us")
     if runtime is not None and period:
@@ -157,7 +161,7 @@ def _kernel() -> tuple[Item, ...]:
     governor = _text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
     if governor and governor != "performance":
         found.append(
-            Item(
+            ComputerSetting(
                 "processor",
                 False,
                 f"its frequency follows the load (governor {governor})",
@@ -167,15 +171,19 @@ def _kernel() -> tuple[Item, ...]:
     return tuple(found)
 
 
-def _limit(runtime: int, period: int) -> Item:
+def _limit(runtime: int, period: int) -> ComputerSetting:
     """How long real-time threads may run on a processor within a period, us; -1 for no limit."""
     if not 0 <= runtime < period:
-        return Item("kernel", True, "no limit of real-time threads by sched_rt_runtime_us")
+        return ComputerSetting(
+            "kernel", True, "no limit of real-time threads by sched_rt_runtime_us"
+        )
     detail = f"real-time threads get {runtime} of {period} us on each processor"
     if runtime < _THROTTLED * period:
-        return Item("kernel", False, detail, "sysctl -w kernel.sched_rt_runtime_us=950000")
+        return ComputerSetting(
+            "kernel", False, detail, "sysctl -w kernel.sched_rt_runtime_us=950000"
+        )
     rest = (period - runtime) / 1000
-    return Item(
+    return ComputerSetting(
         "kernel",
         True,
         f"{detail}; threads that ask for more make the control loop stand still for {rest:.0f} ms",

@@ -16,9 +16,9 @@ from typing import Literal
 from winchkit.bench.control.motion import commanded_and_moved
 from winchkit.bench.control.observation import (
     Instrumented,
-    Memory,
     Quantities,
     Supervised,
+    SupervisorMemory,
     WinchInput,
 )
 from winchkit.bench.control.snapshot import Direction
@@ -44,8 +44,8 @@ _FOLLOWING_DEBOUNCE = 0.05
 _SLIP_TIME = 0.5
 """s: lag of a length instrument behind the motor, with its filter, is over."""
 
-Test = Callable[[WinchInput, Supervised, Memory], bool]
-Words = Callable[[WinchInput, Supervised, Memory], str]
+Test = Callable[[WinchInput, Supervised, SupervisorMemory], bool]
+Words = Callable[[WinchInput, Supervised, SupervisorMemory], str]
 When = Literal["", "moving", "disabled", "follows"]
 """A field of :class:`WinchInput`; empty for always."""
 
@@ -64,7 +64,7 @@ class Exceeds:
         found = self._bound(own)
         return math.inf if found is None else found
 
-    def __call__(self, _item: WinchInput, own: Supervised, memory: Memory) -> bool:
+    def __call__(self, _item: WinchInput, own: Supervised, memory: SupervisorMemory) -> bool:
         """Whether the quantity of the newest observations is above the bound."""
         return memory.quantities[self.place] > self.bound(own)
 
@@ -121,14 +121,14 @@ def _slack_limit(own: Supervised) -> float | None:
     return None if slack is None else -slack
 
 
-def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
+def _stale_words(item: WinchInput, _own: Supervised, _memory: SupervisorMemory) -> str:
     cell, age = _cell(item), _age(item)
     since = "yet" if math.isinf(age) else f"for {age:.2f} s"
     reason = f": {cell.problem}" if cell.problem else ""
     return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
 
 
-def _slowing_words(item: WinchInput, own: Supervised, memory: Memory) -> str:
+def _slowing_words(item: WinchInput, own: Supervised, memory: SupervisorMemory) -> str:
     speeds = f"{item.winding_speed:.3f} m/s, commanded {item.target_speed:.3f} m/s"
     if memory.reversed:
         return (

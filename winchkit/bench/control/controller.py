@@ -13,16 +13,16 @@ from winchkit.bench.control.motion import (
     MotionSource,
     PathStop,
     RunDown,
+    Setpoint,
     StartGate,
     Stop,
-    Target,
     commanded_and_moved,
 )
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import StopEscalation, StopEvidence, StopMethod
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, DriveState, RequestedState
 from winchkit.schema.bench import LimitSpec
 
 _ENABLE_TIME = 2.0
@@ -51,9 +51,13 @@ _LEAST_WAY = 1e-3
 loop, and a position loop's last error, are below."""
 _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
-_OPERATION_ENABLED = State.OPERATION_ENABLED
+_OPERATION_ENABLED = DriveState.OPERATION_ENABLED
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
-_ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+_ENABLED = (
+    DriveState.OPERATION_ENABLED,
+    DriveState.QUICK_STOP_ACTIVE,
+    DriveState.FAULT_REACTION_ACTIVE,
+)
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,7 @@ class Controller:
     def ready_for(self, source: MotionSource) -> bool:
         """Whether the drive is enabled, at rest, and waits for nothing but this source."""
         feedback = self.axis.feedback
-        if feedback is None or feedback.state is not State.OPERATION_ENABLED:
+        if feedback is None or feedback.state is not DriveState.OPERATION_ENABLED:
             return False
         if self.phase is Phase.ENABLING:
             return self.source is source
@@ -306,7 +310,7 @@ class Controller:
                 self._asked = None
                 axis.end_stop()
             return False
-        if axis.sdo_state is State.OPERATION_ENABLED:
+        if axis.sdo_state is DriveState.OPERATION_ENABLED:
             self._asked = None
             axis.end_stop()
             return True
@@ -337,7 +341,7 @@ class Controller:
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)
             return
-        enabled = feedback.state is State.OPERATION_ENABLED
+        enabled = feedback.state is DriveState.OPERATION_ENABLED
         if enabled and self._begun is not None and self._begun.may_start(self._time):
             self._begun.source.start(self._time, feedback.angle, 0.0)
             self._angle = self._origin = feedback.angle
@@ -368,7 +372,7 @@ class Controller:
             if not source.holds:
                 self._begin_run_down(now)
 
-    def _compare_way(self, target: Target, feedback: AxisFeedback) -> None:
+    def _compare_way(self, target: Setpoint, feedback: AxisFeedback) -> None:
         """Note the failure of a motor that has not turned as commanded, however slowly."""
         if target.angle is None or not self.follows:
             return
@@ -379,7 +383,7 @@ class Controller:
                 f"{commanded_and_moved(asked, moved)}; check brake, load and drive limits"
             )
 
-    def _follow(self, target: Target, feedback: AxisFeedback) -> None:
+    def _follow(self, target: Setpoint, feedback: AxisFeedback) -> None:
         velocity, angle, winding_speed, _, start = target
         fastest = self.limits.speed / abs(self.cable.at(feedback.angle)[1])
         if not abs(velocity) <= fastest:
@@ -402,7 +406,7 @@ class Controller:
     def _slow_down(self, now: float, feedback: AxisFeedback) -> None:
         target = self._down.target(self._time, feedback.angle, now)
         self.commanded = target.winding_speed
-        left = feedback.state is not State.OPERATION_ENABLED
+        left = feedback.state is not DriveState.OPERATION_ENABLED
         if left and _keeps_enabled(self._word):
             self._leave(now, feedback)
             return
@@ -423,7 +427,7 @@ class Controller:
         sampled = feedback.sync > self._stop_sync
         if self.escalation.method is not None:
             self._escalate(now, feedback)
-        elif (sampled and feedback.state is State.OPERATION_ENABLED) or self._enabled_unseen(
+        elif (sampled and feedback.state is DriveState.OPERATION_ENABLED) or self._enabled_unseen(
             now, feedback
         ):
             self.uncommanded = "the drive was enabled while it was being stopped"
@@ -453,7 +457,7 @@ class Controller:
 
     def _reset(self, now: float, feedback: AxisFeedback) -> None:
         self._word = self.axis.send(RequestedState.RESET)
-        if feedback.state is not State.FAULT or now - self._since > _RESET_TIME:
+        if feedback.state is not DriveState.FAULT or now - self._since > _RESET_TIME:
             self._enter(Phase.DISABLED, now)
 
 
@@ -462,9 +466,9 @@ def _keeps_enabled(word: int) -> bool:
     return word & ENABLE_OPERATION == ENABLE_OPERATION
 
 
-def _has_left(state: State) -> bool:
+def _has_left(state: DriveState) -> bool:
     """Whether a status word says that the drive is not in operation enabled."""
-    return state not in (State.OPERATION_ENABLED, State.UNKNOWN)
+    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
 def heard_by_sdo(nmt: str) -> bool:

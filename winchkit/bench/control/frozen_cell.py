@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from math import erfc, exp, inf, isfinite, log, nan, pi, sqrt
 from statistics import NormalDist, median
 
-from winchkit.drivers.reading import Quality, Reading
+from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.units import GRAVITY
 
 _CONFIDENCE = 1e-9
@@ -174,8 +174,8 @@ class FrozenCell:
         self._step = nan
         self._noise = _Noise()
         self._predictions: deque[tuple[float, float]] = deque()
-        self._last: Reading | None = None
-        self._start: Reading | None = None
+        self._last: InstrumentReading | None = None
+        self._start: InstrumentReading | None = None
         self._expected: tuple[float, float] | None = None
         """Least of the upper and largest of the lower ends of the predictions of the run, N."""
         self._stopped = nan
@@ -192,7 +192,7 @@ class FrozenCell:
         return self._noisy
 
     def update(
-        self, reading: Reading | None, now: float, predicted: float = nan, *, moving: bool
+        self, reading: InstrumentReading | None, now: float, predicted: float = nan, *, moving: bool
     ) -> Frozen | None:
         """The finding in this cycle, if any.
 
@@ -215,7 +215,7 @@ class FrozenCell:
             self._take(reading, last, now - self._stopped > _CALM)
         return self.finding
 
-    def _take(self, reading: Reading, last: Reading | None, calm: bool) -> None:
+    def _take(self, reading: InstrumentReading, last: InstrumentReading | None, calm: bool) -> None:
         known = isfinite(reading.raw) and not reading.quality & ~_KEEPS_COUNTING
         if not known or last is None or self._start is None:
             self._begin(reading if known else None)
@@ -234,14 +234,14 @@ class FrozenCell:
             duration = reading.t_receive - self._start.t_receive
             self.finding = Frozen(reading.raw, duration, self._run, predicted if drift else nan)
 
-    def _begin(self, reading: Reading | None) -> None:
+    def _begin(self, reading: InstrumentReading | None) -> None:
         self._start, self.finding = reading, None
         self._run = self._sum = self._rest = 0.0
         self._expected = None
         if reading is not None and not isfinite(self._step):
             self._step = _divisor(reading.raw)
 
-    def _changed(self, reading: Reading, last: Reading, calm: bool) -> None:
+    def _changed(self, reading: InstrumentReading, last: InstrumentReading, calm: bool) -> None:
         change = abs(reading.raw - last.raw)
         if not change > _SAME * self._step:
             self._noise.rescale(self._step / change)
@@ -271,7 +271,7 @@ class FrozenCell:
         low = min(self._noise.low, default=0.0)
         return -log(1 - erfc(0.5 / (sqrt(2) * low))) if low > 0 else 0.0
 
-    def _drift(self, reading: Reading) -> tuple[float, float]:
+    def _drift(self, reading: InstrumentReading) -> tuple[float, float]:
         """Predicted change since the last one of the count (N), and -ln p of a repeat by it."""
         high, start = self._highest(), self._start
         if start is None or reading.t_sample < start.t_receive + 2 * _SETTLING:
@@ -309,7 +309,7 @@ class FrozenCell:
             least, most = self._expected or (inf, -inf)
             self._expected = (min(least, top), max(most, low))
 
-    def _range(self, reading: Reading, *, later: bool = False) -> tuple[float, float]:
+    def _range(self, reading: InstrumentReading, *, later: bool = False) -> tuple[float, float]:
         """Least and largest prediction that may have been in force at a reading."""
         begin = reading.t_sample - reading.t_uncertainty - _SETTLING
         end = reading.t_sample + reading.t_uncertainty + _SETTLING * later
@@ -322,7 +322,7 @@ class FrozenCell:
         return (low, top) if low <= top else (nan, nan)
 
 
-class HangingLoad:
+class PredictedTension:
     """Predicted tension of a cable that a known mass hangs on: m (g + a)."""
 
     def __init__(self, mass: float) -> None:

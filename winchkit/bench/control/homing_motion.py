@@ -8,8 +8,8 @@ from typing import Protocol
 
 from winchkit.arguments import number
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import Target
-from winchkit.drivers.can.cia402.modes import Homing
+from winchkit.bench.control.motion import Setpoint
+from winchkit.drivers.can.cia402.modes import HomingState
 
 _SETTLE = 0.06
 """For which bits of an earlier homing may still stand, s."""
@@ -40,7 +40,7 @@ class HomingAxis(Protocol):
     """Progress of a homing; implemented by ``Cia402Axis``."""
 
     @property
-    def homing(self) -> Homing:
+    def homing(self) -> HomingState:
         """By the drive's newest status word."""
 
 
@@ -62,7 +62,7 @@ class HomingMotion:
         self._begun = self._time = time
         self._angle = angle
 
-    def target(self, time: float, angle: float, _now: float) -> Target:
+    def target(self, time: float, angle: float, _now: float) -> Setpoint:
         """Keep bit 4 set until the drive says that it is over."""
         step, change = time - self._time, angle - self._angle
         self._time, self._angle = time, angle
@@ -71,8 +71,8 @@ class HomingMotion:
         self._left -= abs(speed) * step
         state = self._axis.homing
         over = time - self._begun >= _SETTLE and state.over
-        if over and state is not Homing.DONE:
+        if over and state is not HomingState.DONE:
             self.failure = "the drive says that it failed"
         elif not over and self._left < 0:
             self.failure = "no zero was found on twice the way between limits.length"
-        return Target(0.0, None, speed, done=over or bool(self.failure), start=True)
+        return Setpoint(0.0, None, speed, done=over or bool(self.failure), start=True)

@@ -18,7 +18,7 @@ from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
-from winchkit.drivers.can.cia402.state_machine import State
+from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, Thread, event_of, thread_of
 from winchkit.errors import ConnectionLost, MotionError, UsageError, WinchkitError
@@ -411,7 +411,9 @@ class ControlLoop:
     def _ramping(self) -> bool:
         """Whether every drive reports that it has left operation enabled."""
         said = [parts.axis.feedback for parts in self.winches.values()]
-        return all(item is not None and item.state is not State.OPERATION_ENABLED for item in said)
+        return all(
+            item is not None and item.state is not DriveState.OPERATION_ENABLED for item in said
+        )
 
     def _show_trips(self) -> None:
         """Trips, phases and power states of now; what was measured before is not valid any more."""

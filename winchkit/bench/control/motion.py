@@ -85,7 +85,7 @@ SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
 
 
-class Target(NamedTuple):
+class Setpoint(NamedTuple):
     """Setpoint of a drive in one cycle."""
 
     velocity: float
@@ -110,7 +110,7 @@ class MotionSource(Protocol):
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin at a motor angle (rad) and a winding speed (m/s)."""
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Target at ``time`` (s), the motor being at ``angle`` (rad).
 
         Time of motion advances by whole periods of control, those in which no cycle began included
@@ -185,7 +185,7 @@ class Jog:
         self._ramp = Ramp(self._limits.acceleration, winding_speed)
         self._angle, self._last = angle, time
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Follow the commanded speed, slow down before a length limit, end at rest once expired."""
         live = self.dead_man.live(now)
         length, arm = self._cable.at(angle)
@@ -195,7 +195,7 @@ class Jog:
         self._angle += velocity * (time - self._last)
         self._last = time
         # What Target(...) makes, without the call of its constructor.
-        return _new(Target, (velocity, self._angle, speed, not live and speed == 0.0, False))
+        return _new(Setpoint, (velocity, self._angle, speed, not live and speed == 0.0, False))
 
     def _within(self, requested: float, length: float) -> float:
         """Commanded speed, limited to the one from which the winch stops before a length limit.
@@ -235,16 +235,16 @@ class RunDown:
         self._duration = abs(winding_speed) / self._acceleration
         self._angle, self._last = angle, time
 
-    def target(self, time: float, angle: float, _now: float) -> Target:
+    def target(self, time: float, angle: float, _now: float) -> Setpoint:
         """Setpoint with the speed reduced by one cycle's deceleration."""
         before, speed = self._ramp.speed, self._ramp.follow(0.0, time)
         arm = self._cable.at(angle)[1]
         self._angle += (before + speed) / 2 / arm * (time - self._last)
         self._last = time
-        return Target(speed / arm, self._angle, speed, done=speed == 0.0)
+        return Setpoint(speed / arm, self._angle, speed, done=speed == 0.0)
 
 
-class Move:
+class PlannedMove:
     """A planned S-curve to a cable length; holds there when asked to."""
 
     joins = False
@@ -300,7 +300,7 @@ class Move:
             self.prepare(angle)
         self._start = time
 
-    def target(self, time: float, angle: float, _now: float) -> Target:
+    def target(self, time: float, angle: float, _now: float) -> Setpoint:
         """Setpoint of the planned move, with the position loop's correction for speed control."""
         if self._trim is not None and self._ended:
             return self._trimmed(self._trim, time, angle)
@@ -314,12 +314,12 @@ class Move:
         arrived = late >= 0 and abs(planned - angle) <= SETTLED * abs(slope)
         self._ended = arrived or late >= SETTLE_TIME
         done = self._ended and self._trim is None
-        return Target(velocity, planned, -speed, done=done)
+        return Setpoint(velocity, planned, -speed, done=done)
 
-    def _trimmed(self, trim: Trim, time: float, angle: float) -> Target:
+    def _trimmed(self, trim: Trim, time: float, angle: float) -> Setpoint:
         """Setpoint of the correction that follows the planned move."""
         planned, velocity, speed = trim.at(time, self._knots[-1])
-        return Target(velocity + GAIN * (planned - angle), planned, speed, done=trim.done)
+        return Setpoint(velocity + GAIN * (planned - angle), planned, speed, done=trim.done)
 
     def _angle_at(self, position: float) -> tuple[float, float]:
         """Motor angle at a distance from the start, and its derivative by that distance."""

@@ -232,7 +232,7 @@ class Supervised:
 
 
 @dataclass
-class Memory:
+class SupervisorMemory:
     """State of the supervisor for one winch."""
 
     own: Supervised

@@ -23,7 +23,7 @@ from typing import Literal
 
 from winchkit.bench.control.computer import (
     PRIORITY,
-    Item,
+    ComputerSetting,
     instrument_reading,
     locks_without_limit,
     memory_remedy,
@@ -55,7 +55,7 @@ _Scheduling = tuple[int, int]
 class RealTime:
     """Granted and refused settings, with the change that would permit the latter."""
 
-    items: tuple[Item, ...]
+    items: tuple[ComputerSetting, ...]
     _before: dict[int, _Scheduling] = field(default_factory=dict, repr=False, compare=False)
     _undo: ExitStack = field(default_factory=ExitStack, repr=False, compare=False)
 
@@ -65,7 +65,7 @@ class RealTime:
         return all(item.granted for item in self.items)
 
     @property
-    def refused(self) -> tuple[Item, ...]:
+    def refused(self) -> tuple[ComputerSetting, ...]:
         """Settings that were refused."""
         return tuple(item for item in self.items if not item.granted)
 
@@ -92,7 +92,7 @@ class RealTime:
         self._undo.close()
 
 
-NOT_REQUESTED = Item(
+NOT_REQUESTED = ComputerSetting(
     "real-time",
     False,
     "not requested: the control loop shares the processor with every other program",
@@ -115,8 +115,8 @@ def acquire(request: Request, urgent: Iterable[int], *, simulated: bool = False)
             _freeze(stack)
             return RealTime((NOT_REQUESTED,), _undo=stack.pop_all())
     if sys.platform != "linux":
-        items: tuple[Item, ...] = (
-            Item("real-time", False, f"not available on {sys.platform}", "use Linux"),
+        items: tuple[ComputerSetting, ...] = (
+            ComputerSetting("real-time", False, f"not available on {sys.platform}", "use Linux"),
         )
         return _demanded(RealTime(items), request)
     before: dict[int, _Scheduling] = {}
@@ -158,18 +158,20 @@ class RestCollector:
             self._collect()
 
 
-def _schedule(urgent: frozenset[int], before: dict[int, _Scheduling], stack: ExitStack) -> Item:
+def _schedule(
+    urgent: frozenset[int], before: dict[int, _Scheduling], stack: ExitStack
+) -> ComputerSetting:
     try:
         _prioritise(urgent, before)
     except OSError as error:
         detail = f"SCHED_FIFO with priority {PRIORITY} is refused ({error.strerror})"
-        return Item("scheduling", False, detail, scheduling_remedy())
+        return ComputerSetting("scheduling", False, detail, scheduling_remedy())
     stack.callback(_restore, before)
     detail = (
         f"SCHED_FIFO, priority {PRIORITY} for control and CAN reception, "
         f"{LOW_PRIORITY} for the rest of the process"
     )
-    return Item("scheduling", True, detail)
+    return ComputerSetting("scheduling", True, detail)
 
 
 def _prioritise(
@@ -204,7 +206,7 @@ def _scheduling_of(thread: int) -> _Scheduling:
     return os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority
 
 
-def _lock_memory(stack: ExitStack) -> Item:
+def _lock_memory(stack: ExitStack) -> ComputerSetting:
     """Lock the mapped memory and, where the limit permits, future mappings."""
     import resource
 
@@ -216,12 +218,12 @@ def _lock_memory(stack: ExitStack) -> Item:
     if libc.mlockall(_CURRENT):
         reason = os.strerror(ctypes.get_errno())
         limit = "unlimited" if hard == resource.RLIM_INFINITY else f"limit {hard / 2**20:.0f} MB"
-        return Item("memory", False, f"not locked ({reason}; {limit})", memory_remedy())
+        return ComputerSetting("memory", False, f"not locked ({reason}; {limit})", memory_remedy())
     stack.callback(libc.munlockall)
     # Under a limit, memory locked in advance would make a later allocation fail.
     if locks_without_limit(hard) and not libc.mlockall(_CURRENT | _FUTURE | _ON_FAULT):
-        return Item("memory", True, "locked")
-    return Item("memory", True, "locked as far as it is mapped now")
+        return ComputerSetting("memory", True, "locked")
+    return ComputerSetting("memory", True, "locked as far as it is mapped now")
 
 
 def _freeze(stack: ExitStack) -> None:
@@ -232,14 +234,16 @@ def _freeze(stack: ExitStack) -> None:
     gc.freeze()
 
 
-def _bound_collector(stack: ExitStack) -> Item:
+def _bound_collector(stack: ExitStack) -> ComputerSetting:
     stack.callback(gc.set_threshold, *gc.get_threshold())
     _freeze(stack)
     gc.set_threshold(YOUNG, _NEVER, _NEVER)
-    return Item("collector", True, f"frozen; {YOUNG} young objects at most, the others at rest")
+    return ComputerSetting(
+        "collector", True, f"frozen; {YOUNG} young objects at most, the others at rest"
+    )
 
 
-def _switch_sooner(stack: ExitStack) -> Item:
+def _switch_sooner(stack: ExitStack) -> ComputerSetting:
     stack.callback(sys.setswitchinterval, sys.getswitchinterval())
     sys.setswitchinterval(SWITCH)
-    return Item("interpreter lock", True, f"handed over after {SWITCH * 1e3:g} ms")
+    return ComputerSetting("interpreter lock", True, f"handed over after {SWITCH * 1e3:g} ms")

@@ -14,7 +14,13 @@ from operator import gt
 from typing import NamedTuple
 
 from winchkit.bench.control.conditions import CONDITIONS, Condition, Exceeds, Test
-from winchkit.bench.control.observation import Memory, Quantities, Supervised, WinchInput, facts_of
+from winchkit.bench.control.observation import (
+    Quantities,
+    Supervised,
+    SupervisorMemory,
+    WinchInput,
+    facts_of,
+)
 from winchkit.bench.control.snapshot import Direction, Trip
 
 _BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
@@ -24,7 +30,7 @@ _Case = tuple[bool, bool, bool, bool]
 """Whether the load cell is there, and the winch moving, disabled and to follow."""
 
 
-class _Tested(NamedTuple):
+class _TestedConditions(NamedTuple):
     """The conditions that are tested in a case."""
 
     every: _Rows
@@ -51,7 +57,7 @@ class Supervisor:
         """Trips that a reset is about to clear; one of the same kind that comes now is another."""
         self._latching = threading.Lock()
         """A trip that comes while others are cleared is not lost."""
-        self._memory = {name: Memory(own) for name, own in winches.items()}
+        self._memory = {name: SupervisorMemory(own) for name, own in winches.items()}
         self._rows = {name: _by_case(conditions, own) for name, own in winches.items()}
 
     def check(self, now: float, inputs: Mapping[str, WinchInput]) -> tuple[Trip, ...]:
@@ -102,7 +108,7 @@ class Supervisor:
         The latch stays until :meth:`clear`. What trips from now on is not cleared by it.
         """
         for name, memory in self._memory.items():
-            self._memory[name] = Memory(memory.own, boot_ups.get(name, memory.boot_ups))
+            self._memory[name] = SupervisorMemory(memory.own, boot_ups.get(name, memory.boot_ups))
         with self._latching:
             self._acknowledged = self.tripped
         return self._acknowledged
@@ -147,7 +153,7 @@ def _debounced(
             yield row
 
 
-def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _Tested]:
+def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _TestedConditions]:
     """The conditions that are tested in each case."""
     applying = [row for row in conditions if _applies(row, own)]
     found = {}
@@ -159,7 +165,7 @@ def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _T
             if holds[row.when] and (cell or row.needs not in _BY_CELL)
         )
         by_numbers = tuple((test, row) for test, row in rows if not row.by_facts)
-        tested = _Tested(rows, by_numbers, _bounds([test for test, _ in by_numbers], own))
+        tested = _TestedConditions(rows, by_numbers, _bounds([test for test, _ in by_numbers], own))
         found[cell, moving, disabled, follows] = tested
     return found
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Ramp, Target
+from winchkit.bench.control.motion import Ramp, Setpoint
 from winchkit.errors import UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.profiles.winch import CableSpec
@@ -169,7 +169,7 @@ class TensionControl:
         self._begin = self._angle = angle
         self._last = time
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Speed by the tension error, within speed and travel; rest without a valid reading."""
         live = self.dead_man.live(now)
         arm = self._cable.at(angle)[1]
@@ -179,7 +179,7 @@ class TensionControl:
         velocity = speed / arm
         self._angle += velocity * (time - self._last)
         self._last = time
-        return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
+        return Setpoint(velocity, self._angle, speed, done=not live and speed == 0.0)
 
     def _requested(self, now: float, travelled: float) -> float:
         setting = self.setting

@@ -10,12 +10,12 @@ from typing import Any, Protocol
 from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
-from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
+from winchkit.bench.control.frozen_cell import FrozenCell, PredictedTension
 from winchkit.bench.control.observation import Instrumented, WinchInput
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import State
-from winchkit.drivers.reading import Reading
+from winchkit.drivers.can.cia402.state_machine import DriveState
+from winchkit.drivers.reading import InstrumentReading
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
 from winchkit.schema.profiles.winch import CableSpec
@@ -23,10 +23,10 @@ from winchkit.schema.profiles.winch import CableSpec
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
 """SYNC messages that a drive may leave without a TPDO before it counts as silent."""
-_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+_FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__
 _NO_WAY = (0.0, 0.0)
-_NOTHING = AxisFeedback(math.nan, 0, State.UNKNOWN, 0, math.nan, math.nan, math.nan)
+_NOTHING = AxisFeedback(math.nan, 0, DriveState.UNKNOWN, 0, math.nan, math.nan, math.nan)
 """Feedback of a drive that has sent nothing yet."""
 
 
@@ -37,7 +37,7 @@ class SensorPort(Protocol):
     """A reading older than this is stale, s."""
 
     @property
-    def latest(self) -> Reading | None:
+    def latest(self) -> InstrumentReading | None:
         """Newest reading."""
 
     @property
@@ -56,7 +56,7 @@ class WinchParts:
     """By role: cell, load, length, temperature."""
     frozen: FrozenCell | None = None
     """The test of its load cell, if it has one."""
-    load: HangingLoad = field(default_factory=lambda: HangingLoad(math.nan))
+    load: PredictedTension = field(default_factory=lambda: PredictedTension(math.nan))
     """Predicts the tension for that test."""
     commander: str = ""
     """Name of the client that commands it."""
@@ -178,7 +178,10 @@ def _fresh(sensor: Instrumented, now: float) -> float:
 
 
 def _instrumented(
-    reading: Reading | None, trouble: ConnectionLost | None, max_age: float, resumed: float
+    reading: InstrumentReading | None,
+    trouble: ConnectionLost | None,
+    max_age: float,
+    resumed: float,
 ) -> Instrumented:
     """Newest reading of a sensor; its age counts from ``resumed`` (s) on at the earliest."""
     problem = "" if trouble is None else str(trouble)

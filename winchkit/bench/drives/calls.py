@@ -14,7 +14,7 @@ from typing import Any
 from winchkit.arguments import path_of
 from winchkit.bench.cells.instruments import device_of
 from winchkit.bench.drives.node_access import bus_only, drive_at, free_bus, nodes_on
-from winchkit.drivers.can.bus.load import FrameKind, Load, load_of
+from winchkit.drivers.can.bus.load import BusLoad, FrameKind, load_of
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.lss import UNCONFIGURED, LssLine
 from winchkit.drivers.can.canopen.node import read_dictionary
@@ -31,7 +31,7 @@ from winchkit.drivers.can.tools.config import (
     write_config_file,
 )
 from winchkit.drivers.can.tools.info import DriveInfo, read_info
-from winchkit.drivers.can.tools.scan import Found
+from winchkit.drivers.can.tools.scan import ScannedNode
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.bench import BenchSpec, WinchWiring
 from winchkit.schema.devices.servo import PdoSpec
@@ -41,7 +41,7 @@ _COMMANDS = {(0x6040, 0), (0x6060, 0), (0x60B1, 0), (0x60B2, 0)}
 """Control word, mode and offsets: an RPDO with one of them, or the mode's target, is sent."""
 
 
-def loads(spec: BenchSpec) -> dict[str, Load]:
+def loads(spec: BenchSpec) -> dict[str, BusLoad]:
     """Worst-case load of every CAN bus, by name; raises FileError."""
     found = {}
     read = cache(read_dictionary)
@@ -117,7 +117,7 @@ def can_bus(
     return bus_only(interface, channel, bitrate, port)
 
 
-def scan(bench: Wiring) -> list[Found]:
+def scan(bench: Wiring) -> list[ScannedNode]:
     """List every node of the CAN buses: identity, heartbeat, the device file that fits.
 
     Parameters
@@ -127,7 +127,7 @@ def scan(bench: Wiring) -> list[Found]:
 
     Returns
     -------
-    list of Found
+    list of ScannedNode
         Empty where no node answers.
 
     Raises
@@ -341,7 +341,7 @@ def lss_set(
     return chosen
 
 
-def bus_load(bench: str | Path | BenchSpec) -> dict[str, Load]:
+def bus_load(bench: str | Path | BenchSpec) -> dict[str, BusLoad]:
     """Compute the largest load of every CAN bus of a bench; opens nothing.
 
     Parameters

@@ -15,7 +15,7 @@ from winchkit.bench.remote.identity import client_name
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import fitting_device
 from winchkit.drivers.can.canopen.node import Objects, SdoNode, read_dictionary
-from winchkit.drivers.can.tools.scan import Found, RawNode, identity_of, named_after, scan
+from winchkit.drivers.can.tools.scan import RawNode, ScannedNode, identity_of, named_after, scan
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import DeviceRefused, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
@@ -52,7 +52,7 @@ def bus_only(
     return BenchSpec(f"{interface} {channel}", {}, {bus: spec})
 
 
-def nodes_on(spec: BenchSpec, clock: Clock | None = None) -> list[Found]:
+def nodes_on(spec: BenchSpec, clock: Clock | None = None) -> list[ScannedNode]:
     """Scan every CAN bus of a bench; the owner does it where there is one.
 
     Raises FileError, ConnectionLost, NotPermitted.

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
-from winchkit.drivers.reading import Reading, Sensor
+from winchkit.drivers.reading import InstrumentReading, Sensor
 from winchkit.runs.align import patience_of
-from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 
 if TYPE_CHECKING:
-    from winchkit.bench.tracker import TrackedPose, Tracker
+    from winchkit.bench.tracker import TrackedPose, TrackerReceiver
 
 
 @dataclass
@@ -41,7 +41,7 @@ class Silences:
         self._last = dict.fromkeys(self._longest, layout.rule.opened)
         self._silences = {topic: _Silence() for topic in self._longest}
 
-    def note(self, pieces: Mapping[str, Samples], now: float) -> None:
+    def note(self, pieces: Mapping[str, SourceSamples], now: float) -> None:
         """Take what has arrived until ``now`` (s)."""
         for topic, silence in self._silences.items():
             arrived = pieces[topic].received if topic in pieces else np.empty(0)
@@ -84,7 +84,9 @@ _of_drive = attrgetter("time", *_DRIVE, *_OF_PROFILE, "phase")
 _TORQUE = 1 + list(_DRIVE).index("motor_torque")
 _TIMES = ("t_request", "t_receive", "t_sample", "t_uncertainty")
 _NUMBERS = tuple(
-    item.name for item in fields(Reading) if item.type == "float" and item.name not in _TIMES[1:3]
+    item.name
+    for item in fields(InstrumentReading)
+    if item.type == "float" and item.name not in _TIMES[1:3]
 )
 _of_reading = attrgetter("t_sample", "t_receive", *_NUMBERS)
 _FAST_GAP = 0.1
@@ -95,12 +97,12 @@ _BARE_PERIOD = 0.0095
 _JITTER = 0.95
 """Share of an instrument's period: two samples of a drive are nearly as far apart as two readings.
 """
-_TRACKER = Source(
+_TRACKER = SignalSource(
     "/robot/tracker",
     (
-        *(Signal(axis, "m", f"tracker_{axis}") for axis in "xyz"),
-        *(Signal(part, "1", f"tracker_{part}") for part in ("qw", "qx", "qy", "qz")),
-        Signal("tracker_time", "s"),
+        *(SourceSignal(axis, "m", f"tracker_{axis}") for axis in "xyz"),
+        *(SourceSignal(part, "1", f"tracker_{part}") for part in ("qw", "qx", "qy", "qz")),
+        SourceSignal("tracker_time", "s"),
     ),
     _FAST_GAP,
 )
@@ -117,7 +119,7 @@ class Feed:
         self,
         sensors: Mapping[str, Mapping[str, Sensor]],
         opened: float,
-        tracker: Tracker | None = None,
+        tracker: TrackerReceiver | None = None,
         *,
         has_drives: bool = True,
     ) -> None:
@@ -129,8 +131,8 @@ class Feed:
         self.lost = 0
         """Cycles and readings that were dropped because they were not taken in time."""
         self._snapshots: deque[BenchSnapshot] = deque(maxlen=_WAITING)
-        self._readings: dict[str, deque[Reading]] = {}
-        self._listening: list[tuple[Sensor, Callable[[Reading], None]]] = []
+        self._readings: dict[str, deque[InstrumentReading]] = {}
+        self._listening: list[tuple[Sensor, Callable[[InstrumentReading], None]]] = []
         self._drives = {name: f"/{name}/drive" for name in sensors if has_drives}
         sources = [_drive_source(topic, prefix[name]) for name, topic in self._drives.items()]
         topics: dict[int, str] = {}
@@ -162,7 +164,7 @@ class Feed:
             self.lost += 1
         self._snapshots.append(snapshot)
 
-    def take(self) -> tuple[dict[str, Samples], list[BenchSnapshot]]:
+    def take(self) -> tuple[dict[str, SourceSamples], list[BenchSnapshot]]:
         """New samples since the last call, by topic, and the snapshots themselves."""
         snapshots = [self._snapshots.popleft() for _ in range(len(self._snapshots))]
         pieces = {}
@@ -194,7 +196,7 @@ class Feed:
     def _listen(self, topic: str, instrument: Sensor) -> None:
         waiting = self._readings.setdefault(topic, deque(maxlen=_WAITING))
 
-        def take(reading: Reading) -> None:
+        def take(reading: InstrumentReading) -> None:
             if len(waiting) == _WAITING:
                 self.lost += 1
             waiting.append(reading)
@@ -203,33 +205,35 @@ class Feed:
         instrument.listeners.append(take)
 
 
-def _drive_source(topic: str, prefix: str) -> Source:
-    measured = [Signal(name, unit, prefix + name) for name, unit in _DRIVE.items()]
-    shown = [Signal(name, unit) for name, unit in _OF_PROFILE.items()]
-    return Source(topic, (*measured, *shown), _FAST_GAP)
+def _drive_source(topic: str, prefix: str) -> SignalSource:
+    measured = [SourceSignal(name, unit, prefix + name) for name, unit in _DRIVE.items()]
+    shown = [SourceSignal(name, unit) for name, unit in _OF_PROFILE.items()]
+    return SignalSource(topic, (*measured, *shown), _FAST_GAP)
 
 
-def _sensor_source(topic: str, prefix: str, role: str, instrument: Sensor) -> Source:
+def _sensor_source(topic: str, prefix: str, role: str, instrument: Sensor) -> SignalSource:
     channel, unit = CHANNELS[role]
     units = {"value": unit, "gross": unit, "raw": "1"}
     columns = {"value": prefix + channel}
     if role in TARED:
         columns["gross"] = f"{prefix}{channel}_gross"
     signals = [
-        Signal(
+        SourceSignal(
             channel if name == "value" else name,
             units.get(name, "s" if name in _TIMES else unit),
             columns.get(name, ""),
         )
         for name in _NUMBERS
     ]
-    return Source(topic, (*signals, Signal("quality", "1")), max(_FAST_GAP, 5 * instrument.period))
+    return SignalSource(
+        topic, (*signals, SourceSignal("quality", "1")), max(_FAST_GAP, 5 * instrument.period)
+    )
 
 
-def _drive_samples(rows: list[tuple[Any, ...]]) -> Samples:
+def _drive_samples(rows: list[tuple[Any, ...]]) -> SourceSamples:
     """Values of a drive; each SYNC's once."""
     if not rows:
-        return Samples.joined([], len(_DRIVE) + len(_OF_PROFILE))
+        return SourceSamples.joined([], len(_DRIVE) + len(_OF_PROFILE))
     unpowered = [row[-1] in _UNPOWERED for row in rows]
     table = np.array([row[:-1] for row in rows])
     # While the brake holds the cable the drive's torque says nothing of it.
@@ -237,20 +241,20 @@ def _drive_samples(rows: list[tuple[Any, ...]]) -> Samples:
     known = np.isfinite(table[:, 0])
     known[1:] &= table[1:, 0] != table[:-1, 0]
     table = table[known]
-    return Samples(table[:, 0], table[:, 0], table[:, 1:])
+    return SourceSamples(table[:, 0], table[:, 0], table[:, 1:])
 
 
-def _tracked(poses: list[TrackedPose]) -> Samples:
+def _tracked(poses: list[TrackedPose]) -> SourceSamples:
     received = np.array([pose.received for pose in poses])
     values = np.array([(*pose.position, *pose.quaternion, pose.time) for pose in poses])
-    return Samples(received, received, values)
+    return SourceSamples(received, received, values)
 
 
-def _samples(readings: list[Reading]) -> Samples:
+def _samples(readings: list[InstrumentReading]) -> SourceSamples:
     if not readings:
-        return Samples.joined([], len(_NUMBERS) + 1)
+        return SourceSamples.joined([], len(_NUMBERS) + 1)
     table = np.array([(*_of_reading(item), item.quality.value) for item in readings], dtype=float)
-    return Samples(table[:, 0], table[:, 1], table[:, 2:])
+    return SourceSamples(table[:, 0], table[:, 1], table[:, 2:])
 
 
 def _slowest(sensors: Mapping[str, Mapping[str, Sensor]]) -> Sensor | None:

@@ -32,7 +32,7 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.sync import Syncer
 
 if TYPE_CHECKING:
-    from winchkit.bench.tracker import Tracker
+    from winchkit.bench.tracker import TrackerReceiver
 
 
 class OwnedLog:
@@ -81,7 +81,7 @@ class Recorder:
         metadata: Mapping[str, str],
         detach: Callable[[Recorder], None] = lambda _recorder: None,
         *,
-        tracker: Tracker | None = None,
+        tracker: TrackerReceiver | None = None,
         rotation: Rotation | None = None,
         replace: bool = False,
         has_drives: bool = True,

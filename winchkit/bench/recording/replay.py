@@ -13,7 +13,7 @@ from winchkit.arrays import Array
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase, Trip, WinchSnapshot
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import Fault, RunError
-from winchkit.runs.layout import Signal
+from winchkit.runs.layout import SourceSignal
 from winchkit.runs.log import Log
 from winchkit.runs.read import read_log
 
@@ -135,7 +135,7 @@ def open_replay(path: str | Path, clock: Clock | None = None) -> Replay:
     return Replay(read_log(path), clock or MonotonicClock())
 
 
-def _place(topic: str, signal: Signal) -> tuple[str, str] | None:
+def _place(topic: str, signal: SourceSignal) -> tuple[str, str] | None:
     """Winch and field of a picture to which a signal belongs; None for none."""
     of_topic = topic.strip("/").rpartition("/")[0] or "A"
     if not signal.column:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.cells.instruments import can_buses, instruments
-from winchkit.bench.cells.tasks import Cells, LocalCells
+from winchkit.bench.cells.tasks import BenchCells, LocalCells
 from winchkit.bench.remote.client import RemoteCells, attach
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
@@ -18,7 +18,7 @@ from winchkit.schema.bench import BenchSpec
 
 
 @contextmanager
-def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cells]:
+def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[BenchCells]:
     """The instruments of a bench, by its owner or as its owner.
 
     Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client.

@@ -19,7 +19,7 @@ from winchkit.errors import ConnectionLost, UsageError, error_of
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
-    from winchkit.drivers.can.tools.scan import Found
+    from winchkit.drivers.can.tools.scan import ScannedNode
 
 _ANSWER_TIME = 10.0
 """s: longer than the longest answer without a motion, a reset of several drives (some seconds)."""
@@ -115,13 +115,14 @@ class RemoteStation(Station):
         found = self.read_object(winch, index, sub)
         return None if found is None else bytes.fromhex(found)
 
-    def scan(self) -> list[Found]:
+    def scan(self) -> list[ScannedNode]:
         """Who is on the buses."""
         from winchkit.drivers.can.canopen.identity import Identity
-        from winchkit.drivers.can.tools.scan import Found
+        from winchkit.drivers.can.tools.scan import ScannedNode
 
         return [
-            Found(**{**item, "identity": Identity(**item["identity"])}) for item in self.scanned()
+            ScannedNode(**{**item, "identity": Identity(**item["identity"])})
+            for item in self.scanned()
         ]
 
     def close(self) -> None:

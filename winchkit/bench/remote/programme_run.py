@@ -14,7 +14,7 @@ from winchkit.bench.programme import earlier_runs, run_programme
 from winchkit.bench.remote.identity import Client
 from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import MotionError, NotPermitted, UsageError, WinchkitError
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import load
 from winchkit.schema.robot_programme import RobotProgramme
 
@@ -156,7 +156,7 @@ class ProgrammeRun:
         )
         return written
 
-    def _at_step(self, repeat: int, number: int, step: Step) -> None:
+    def _at_step(self, repeat: int, number: int, step: ProgrammeStep) -> None:
         self._require_going()
         self._place, self._does = (repeat, number), step.words
 
@@ -177,7 +177,7 @@ class ProgrammeRun:
                     "was ended"
                 )
 
-    def _ask(self, step: Step) -> None:
+    def _ask(self, step: ProgrammeStep) -> None:
         self._answered.clear()
         self._asks = step.ask or ""
         while not self._answered.wait(_POLL):

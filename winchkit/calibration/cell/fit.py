@@ -41,7 +41,7 @@ _SAME_LOAD = 1e-3
 
 
 @dataclass(frozen=True)
-class Figure:
+class FigureOfMerit:
     """A figure of merit with its standard uncertainty, shares of the span; NaN where not known."""
 
     value: float
@@ -61,10 +61,10 @@ class CellFit:
     """Residual standard deviation with n − p degrees of freedom, N."""
     span: float
     """N."""
-    nonlinearity: Figure
-    zero_return: Figure
-    hysteresis: Figure
-    repeatability: Figure
+    nonlinearity: FigureOfMerit
+    zero_return: FigureOfMerit
+    hysteresis: FigureOfMerit
+    repeatability: FigureOfMerit
     warnings: tuple[str, ...]
 
     @property
@@ -188,16 +188,16 @@ def _groups(load: Array, span: float) -> list[Array]:
     return list(np.split(order, breaks))
 
 
-def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> Figure:
+def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> FigureOfMerit:
     means = np.array([from_line[group].mean() for group in groups])
     worst = int(np.argmax(np.abs(means)))
     spread = _pooled(from_line, groups) / math.sqrt(len(groups[worst]))
-    return Figure(float(abs(means[worst])) / span, spread / span)
+    return FigureOfMerit(float(abs(means[worst])) / span, spread / span)
 
 
 def _returns(
     points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
-) -> tuple[Figure, Figure]:
+) -> tuple[FigureOfMerit, FigureOfMerit]:
     """Zero return, and hysteresis: decreasing less increasing, largest over the other loads."""
     differences = []
     for group in groups:
@@ -207,7 +207,7 @@ def _returns(
             weight = 1 / len(up) + 1 / len(down)
             differences.append((float(np.mean(up) - np.mean(down)), weight, group is groups[0]))
     spread = _pooled(from_line, _split(points, groups))
-    unknown = Figure(math.nan, math.nan)
+    unknown = FigureOfMerit(math.nan, math.nan)
     zero = next(((size, weight) for size, weight, is_zero in differences if is_zero), None)
     loops = [
         (abs(size - (zero[0] if zero else 0.0)), weight + (zero[1] if zero else 0.0))
@@ -216,18 +216,20 @@ def _returns(
     ]
     largest, weight = max(loops, default=(math.nan, math.nan))
     return (
-        unknown if zero is None else Figure(zero[0] / span, spread * math.sqrt(zero[1]) / span),
-        Figure(largest / span, spread * math.sqrt(weight) / span) if loops else unknown,
+        unknown
+        if zero is None
+        else FigureOfMerit(zero[0] / span, spread * math.sqrt(zero[1]) / span),
+        FigureOfMerit(largest / span, spread * math.sqrt(weight) / span) if loops else unknown,
     )
 
 
 def _repeatability(
     points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
-) -> Figure:
+) -> FigureOfMerit:
     split = _split(points, groups)
     free = sum(len(group) - 1 for group in split)
     std = _pooled(from_line, split)
-    return Figure(std / span, std / span / math.sqrt(2 * free) if free > 0 else math.nan)
+    return FigureOfMerit(std / span, std / span / math.sqrt(2 * free) if free > 0 else math.nan)
 
 
 def _split(points: Sequence[CalibrationPoint], groups: list[Array]) -> list[Array]:

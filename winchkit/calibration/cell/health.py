@@ -42,7 +42,7 @@ _ALIASED = 0.02
 
 
 @dataclass(frozen=True)
-class Samples:
+class CellSamples:
     """Readings as arrays of one length; values in SI, NaN where not usable."""
 
     time: Array
@@ -113,7 +113,7 @@ class Health:
     remarks: tuple[str, ...]
 
 
-def examine(samples: Samples) -> Health:
+def examine(samples: CellSamples) -> Health:
     """Health of a load cell.
 
     ``samples``: a few seconds of readings. Raises RunError for fewer than 20 usable readings.
@@ -281,13 +281,13 @@ def _with_remarks(health: Health, duration: float) -> Health:
     return replace(health, remarks=tuple(remarks))
 
 
-def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
+def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> CellSamples:
     """Samples from rows of time, raw counts, value, usable, saturated.
 
     ``rows`` (n, 5): time, s, raw counts, value, usable, saturated.
     """
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
-    return Samples(
+    return CellSamples(
         time.astype(float),
         raw.astype(float),
         value.astype(float),

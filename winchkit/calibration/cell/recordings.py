@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from winchkit.arguments import path_of
 from winchkit.arrays import Array
-from winchkit.calibration.cell.health import Health, Samples, examine, line_fit, step_at
+from winchkit.calibration.cell.health import CellSamples, Health, examine, line_fit, step_at
 from winchkit.drivers.reading import Quality
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.streams import streams_of
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.log import Log
 from winchkit.runs.read import read_log
 from winchkit.runs.run import Channel, Run
@@ -49,7 +49,7 @@ class CellRecording:
     """Column of the file, or ``A.cell`` of a log."""
     unit: str
     """Empty where the file gives none."""
-    samples: Samples
+    samples: CellSamples
     temperature: Array | None = None
     """Shape (n,), in the unit of the file."""
 
@@ -142,11 +142,11 @@ def _of_log(log: Log, wanted: str | None) -> Iterator[CellRecording]:
         usable = np.array([flag.usable for flag in flags], dtype=bool)
         saturated = np.array([bool(flag & _SATURATED) for flag in flags], dtype=bool)
         value, raw = samples.values[:, place["gross"]], samples.values[:, place["raw"]]
-        found = Samples(samples.times, raw, value, usable & np.isfinite(value), saturated)
+        found = CellSamples(samples.times, raw, value, usable & np.isfinite(value), saturated)
         yield CellRecording(name, "N", found)
 
 
-def _of_table(table: Table, wanted: str | None) -> tuple[CellRecording, ...]:
+def _of_table(table: ColumnTable, wanted: str | None) -> tuple[CellRecording, ...]:
     guess = guess_columns(table, Answers())
     channel = {item.source: item.channel for item in guess.used}
     if wanted is not None:
@@ -166,7 +166,7 @@ def _of_table(table: Table, wanted: str | None) -> tuple[CellRecording, ...]:
     return tuple(_of_columns(table, clocks, cell, beside) for cell in cells)
 
 
-def _cells(table: Table, channel: dict[str, str]) -> Iterator[Column]:
+def _cells(table: ColumnTable, channel: dict[str, str]) -> Iterator[FileColumn]:
     """Columns of cells, before any tare; the only column of numbers of a file with a clock."""
     found = {channel.get(item.source, ""): item for item in table.columns}
     for name, column in found.items():
@@ -183,7 +183,7 @@ def _cells(table: Table, channel: dict[str, str]) -> Iterator[Column]:
 
 
 def _of_columns(
-    table: Table, clocks: Sequence[Column], cell: Column, beside: Sequence[Column]
+    table: ColumnTable, clocks: Sequence[FileColumn], cell: FileColumn, beside: Sequence[FileColumn]
 ) -> CellRecording:
     """Times and readings of one column in its own unit."""
     alone = replace(table, columns=(*clocks, cell))
@@ -207,7 +207,7 @@ def _of_columns(
     return CellRecording(
         cell.source,
         cell.unit,
-        Samples(stream.time, raw, value, usable, none),
+        CellSamples(stream.time, raw, value, usable, none),
         None if temperature is None else temperature[stream.rows],
     )
 
@@ -273,8 +273,8 @@ def _steady(value: Array, start: int = 0) -> list[range]:
     return [*_steady(value[: at + 1], start), *_steady(value[at + 1 :], start + at + 1)]
 
 
-def _at(samples: Samples, rows: NDArray[np.intp]) -> Samples:
-    return Samples(
+def _at(samples: CellSamples, rows: NDArray[np.intp]) -> CellSamples:
+    return CellSamples(
         samples.time[rows],
         samples.raw[rows],
         samples.value[rows],

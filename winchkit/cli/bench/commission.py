@@ -7,14 +7,14 @@ import sys
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import json_flag, tell
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit commission bench.toml", "asks somebody beside the winch"),
         Example("winchkit commission --answers answers.toml", "asks somebody beside the winch"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.quantities import dimension, quantity
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def direction_options(value: str) -> Decorator:
             function = click.option(
                 option,
                 metavar=value,
-                type=Quantity("speed", "length", example="50 mm"),
+                type=QuantityType("speed", "length", example="50 mm"),
                 help=f"{meaning} the cable.",
             )(function)
         return function

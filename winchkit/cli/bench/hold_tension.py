@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import click
 
 from winchkit.cli.bench.holding import hold_on
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -17,7 +17,7 @@ from winchkit.cli.core.options import (
     take_over_option,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import MotionError
 
@@ -29,7 +29,7 @@ _READINGS = 10
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit hold-tension A 120N --for 5s", _NEEDS_CELL),
         Example(
@@ -39,19 +39,19 @@ _READINGS = 10
     ),
 )
 @click.argument("winch", metavar="WINCH")
-@click.argument("tension", metavar="TENSION", type=Quantity("force", example="120 N"))
+@click.argument("tension", metavar="TENSION", type=QuantityType("force", example="120 N"))
 @bench_option
 @click.option(
     "--for",
     "duration",
     metavar="TIME",
-    type=Quantity("time", example="5 s"),
+    type=QuantityType("time", example="5 s"),
     help="Stop after this time.  [default: until Ctrl-C]",
 )
 @click.option(
     "--travel",
     metavar="LENGTH",
-    type=Quantity("length", example="0.1 m"),
+    type=QuantityType("length", example="0.1 m"),
     default="0.1 m",
     show_default=True,
     help="Cable either way from its place at the start; the winch trips where it is used up.",
@@ -59,7 +59,7 @@ _READINGS = 10
 @click.option(
     "--speed",
     metavar="SPEED",
-    type=Quantity("speed", example="20 mm/s"),
+    type=QuantityType("speed", example="20 mm/s"),
     default="20 mm/s",
     show_default=True,
     help="Largest speed, without a direction.",
@@ -67,7 +67,7 @@ _READINGS = 10
 @click.option(
     "--stiffness",
     metavar="STIFFNESS",
-    type=Quantity("stiffness", example="40 kN/m"),
+    type=QuantityType("stiffness", example="40 kN/m"),
     help="Upper bound of cable and structure.  [default: by the profile's cable]",
 )
 @take_over_option

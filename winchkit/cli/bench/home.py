@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -15,7 +15,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
@@ -24,7 +24,7 @@ _POLL = 0.02
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit home A --here '2.5 m'",
         "winchkit home A --method 34 --at '2.4 m' --dry-run",
@@ -35,7 +35,7 @@ _POLL = 0.02
 @click.option(
     "--here",
     metavar="LENGTH",
-    type=Quantity("length", example="2 m"),
+    type=QuantityType("length", example="2 m"),
     help="The present cable length; nothing moves.",
 )
 @click.option(
@@ -46,13 +46,13 @@ _POLL = 0.02
 @click.option(
     "--at",
     metavar="LENGTH",
-    type=Quantity("length", example="0.5 m"),
+    type=QuantityType("length", example="0.5 m"),
     help="With --method: cable length at the zero found.",
 )
 @click.option(
     "--speed",
     metavar="SPEED",
-    type=Quantity("speed", example="20 mm/s"),
+    type=QuantityType("speed", example="20 mm/s"),
     help="Cable speed.  [default: a tenth of the winch's limit]",
 )
 @take_over_option

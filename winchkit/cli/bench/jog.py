@@ -16,7 +16,7 @@ from winchkit.cli.bench.direction_option import (
     read_direction,
 )
 from winchkit.cli.bench.holding import hold_on
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_bench
 from winchkit.cli.core.options import (
     bench_option,
@@ -26,7 +26,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line, unknown_length
 from winchkit.errors import NotPermitted, UsageError
 
@@ -39,7 +39,7 @@ _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit jog A --pay-out 0.1m/s --for 0.5s",
         "winchkit jog A --wind-in 50mm -b bench.toml --dry-run",
@@ -52,13 +52,13 @@ _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
     "--for",
     "duration",
     metavar="TIME",
-    type=Quantity("time", example="2 s"),
+    type=QuantityType("time", example="2 s"),
     help="With a SPEED: move for this long, then stop.",
 )
 @click.option(
     "--speed",
     metavar="SPEED",
-    type=Quantity("speed", example="0.05 m/s"),
+    type=QuantityType("speed", example="0.05 m/s"),
     help=f"With keys, or with a LENGTH: how fast; no direction.  [default: {_SPEED}]",
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")

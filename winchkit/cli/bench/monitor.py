@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.bench.remote.interruption import Terminated
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import cell, live_table
 from winchkit.errors import one_line
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit monitor --for 2s",
         "winchkit monitor -b bench.toml --for 1s --json",
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @bench_option
 @click.option(
     "--period",
-    type=Quantity("time", example="0.2 s"),
+    type=QuantityType("time", example="0.2 s"),
     default="0.2 s",
     show_default=True,
     help="Time between two pictures.",
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     "--for",
     "duration",
     metavar="TIME",
-    type=Quantity("time", example="10 s"),
+    type=QuantityType("time", example="10 s"),
     help="End after this time.",
 )
 @json_flag("Print one JSON object a line.")

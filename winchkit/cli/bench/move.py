@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
 from winchkit.cli.bench.pose_option import pose_line, read_pose
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -18,7 +18,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
@@ -32,7 +32,7 @@ _POLL = 0.05
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit move A --to '3.9 m' --speed '0.2 m/s'",
         "winchkit move all --pay-out 50mm -b bench.toml",
@@ -42,7 +42,10 @@ _POLL = 0.05
 @winch_argument
 @bench_option
 @click.option(
-    "--to", metavar="LENGTH", type=Quantity("length", example="2 m"), help="Cable length to go to."
+    "--to",
+    metavar="LENGTH",
+    type=QuantityType("length", example="2 m"),
+    help="Cable length to go to.",
 )
 @direction_options("LENGTH")
 @click.option("--pose", metavar="POSE", help="Pose of the robot's platform, x=0.1m,yaw=2deg.")
@@ -50,13 +53,13 @@ _POLL = 0.05
 @click.option(
     "--speed",
     metavar="SPEED",
-    type=Quantity("speed", example="0.1 m/s"),
+    type=QuantityType("speed", example="0.1 m/s"),
     help="Speed, without a direction.  [default: limit of winch or robot]",
 )
 @click.option(
     "--acceleration",
     metavar="ACCELERATION",
-    type=Quantity("acceleration", example="0.5 m/s^2"),
+    type=QuantityType("acceleration", example="0.5 m/s^2"),
     help="[default: limit of winch or robot]",
 )
 @take_over_option

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import bench_option, dry_run_option
 from winchkit.cli.core.output import json_flag, tell
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit reset",
         "winchkit reset -b bench.toml --json",

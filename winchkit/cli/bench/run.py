@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_folder, check_winches
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
@@ -26,14 +26,14 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-    from winchkit.schema.programme import Programme, Step
+    from winchkit.schema.programme import Programme, ProgrammeStep
 
 _POLL = 0.05
 """s between two looks at a programme; it delays the end of the command only."""
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit run short.toml -b bench.toml -o runs",
         "winchkit run short.toml -b bench.toml --dry-run",
@@ -126,7 +126,7 @@ def _execute(
     programme: Programme,
     out: Path,
     suffix: str,
-    ask: Callable[[Step], None],
+    ask: Callable[[ProgrammeStep], None],
     *,
     replace: bool,
 ) -> list[Path]:
@@ -135,7 +135,7 @@ def _execute(
     from winchkit.bench.programme import run_programme
     from winchkit.bench.remote.identity import client_name
 
-    def report(repeat: int, number: int, step: Step) -> None:
+    def report(repeat: int, number: int, step: ProgrammeStep) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
         note(f"{place}: {step.words}")
 
@@ -178,12 +178,12 @@ def _rehearse(bench: str, programme: Programme, effects: Sequence[str]) -> None:
                 station.clock.sleep(_POLL)
 
 
-def _ask(step: Step) -> None:
+def _ask(step: ProgrammeStep) -> None:
     forget_typed()
     click.confirm(f"{step.ask}; done?", default=True, abort=True, err=True)
 
 
-def _agree(bench: str, step: Step) -> None:
+def _agree(bench: str, step: ProgrammeStep) -> None:
     """Say yes; where the bench is simulated, let the simulation do what is asked."""
     from winchkit.sim.live.client import answer
 

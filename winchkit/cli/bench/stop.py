@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import bench_option, dry_run_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.errors import ConnectionLost, MotionError, WinchkitError
@@ -22,7 +22,7 @@ _BY_OWNER = "the bench's owner confirms it at rest"
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit stop",
         "winchkit stop -b bench.toml --dry-run",

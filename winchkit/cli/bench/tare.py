@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import bench_option, winch_argument
 from winchkit.cli.core.output import json_flag, tell
 
@@ -18,7 +18,7 @@ _DURATION = 1.0
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit tare",
         "winchkit tare A -b bench.toml --json",

@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import figures_option, write_figures, write_page
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from winchkit.bench.cells.tasks import Cells
+    from winchkit.bench.cells.tasks import BenchCells
     from winchkit.calibration.cell.fit import CellFit
     from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
@@ -38,7 +38,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell calibrate --points points.csv -o cell-4711.toml -y",
         Example(
@@ -69,14 +69,14 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 @click.option(
     "--for",
     "duration",
-    type=Quantity("time", example="3 s"),
+    type=QuantityType("time", example="3 s"),
     default="3 s",
     show_default=True,
     help="Averaging time per weight.",
 )
 @click.option(
     "--settle",
-    type=Quantity("time", example="2 s"),
+    type=QuantityType("time", example="2 s"),
     default="2 s",
     show_default=True,
     help="Waiting time after a weight is hung.",
@@ -84,7 +84,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 @click.option("--serial", help="Serial number of the cell; else what the device says.")
 @click.option(
     "--temperature",
-    type=Quantity("temperature", example="21 degC"),
+    type=QuantityType("temperature", example="21 degC"),
     help='Temperature at the cell, e.g. "21 degC".',
 )
 @click.option(
@@ -289,7 +289,7 @@ def _measure(
 
 
 def _hang(
-    found: Cells, name: str, number: str, step: CalibrationPoint, average: float, wait: float
+    found: BenchCells, name: str, number: str, step: CalibrationPoint, average: float, wait: float
 ) -> CalibrationPoint:
     """Ask for one weight and measure it, again where the operator wants."""
     from winchkit.calibration.cell.weighing_order import spoken

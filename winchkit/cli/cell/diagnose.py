@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from winchkit.cli.cell.options import cells, shown, unit_of
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.options import TABLE, bench_by_default
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError, one_line
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
     from winchkit.calibration.cell.recordings import CellFindings
-    from winchkit.drivers.reading import Reading
+    from winchkit.drivers.reading import InstrumentReading
 
 _MEANINGS = {
     "mismatch": "status and value contradict each other; check order, type and scale of the "
@@ -37,7 +37,7 @@ _MEANINGS = {
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell diagnose",
         "winchkit cell diagnose A --for 2s --json",
@@ -64,7 +64,7 @@ _MEANINGS = {
 @click.option(
     "--for",
     "duration",
-    type=Quantity("time", example="10 s"),
+    type=QuantityType("time", example="10 s"),
     default="10 s",
     show_default=True,
     help="Duration of the readings.",
@@ -153,7 +153,7 @@ def _lines_of_recorded(one: CellFindings, run: str) -> Iterator[str]:
     yield from (f"  ! {remark}" for remark in one.remarks)
 
 
-def _flags(readings: list[Reading]) -> dict[str, int]:
+def _flags(readings: list[InstrumentReading]) -> dict[str, int]:
     """How many readings carry each flag."""
     found: Counter[str] = Counter()
     for reading in readings:

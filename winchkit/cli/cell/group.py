@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 
 _READINGS, _ZEROING = "winchkit.cli.cell.readings", "winchkit.cli.cell.zeroing"
 COMMANDS = {
-    "info": At(_READINGS, "What an instrument is, and what it says now.", "info"),
-    "rate": At(_READINGS, "How fast it can be read, and what limits that.", "rate"),
-    "diagnose": At("winchkit.cli.cell.diagnose", "Noise, drift, frozen counts, hum, creep."),
-    "tare": At(_ZEROING, "Count from what hangs on it now, on the host only.", "tare"),
-    "zero": At(_ZEROING, "Send the device its own zero command.", "zero"),
-    "calibrate": At("winchkit.cli.cell.calibrate", "Known weights up and down: fit and report."),
-    "store": At(_ZEROING, "Write the device's EEPROM, on purpose.", "store"),
+    "info": CommandPlace(_READINGS, "What an instrument is, and what it says now.", "info"),
+    "rate": CommandPlace(_READINGS, "How fast it can be read, and what limits that.", "rate"),
+    "diagnose": CommandPlace(
+        "winchkit.cli.cell.diagnose", "Noise, drift, frozen counts, hum, creep."
+    ),
+    "tare": CommandPlace(_ZEROING, "Count from what hangs on it now, on the host only.", "tare"),
+    "zero": CommandPlace(_ZEROING, "Send the device its own zero command.", "zero"),
+    "calibrate": CommandPlace(
+        "winchkit.cli.cell.calibrate", "Known weights up and down: fit and report."
+    ),
+    "store": CommandPlace(_ZEROING, "Write the device's EEPROM, on purpose.", "store"),
 }
 
 

@@ -14,7 +14,7 @@ from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import json_flag
 
 if TYPE_CHECKING:
-    from winchkit.bench.cells.tasks import Cells
+    from winchkit.bench.cells.tasks import BenchCells
 
 _UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
 
@@ -32,7 +32,7 @@ def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @contextmanager
-def cells(bench: str, cell: str | None) -> Iterator[tuple[Cells, str]]:
+def cells(bench: str, cell: str | None) -> Iterator[tuple[BenchCells, str]]:
     """The instruments of a bench, and the full name of the one that is meant."""
     from winchkit.bench.cells.desk import full_name
     from winchkit.bench.remote.cell_session import at_cells

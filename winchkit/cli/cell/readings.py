@@ -8,13 +8,13 @@ from typing import Any
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.output import tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell info",
         "winchkit cell info A -b bench.toml --json",
@@ -50,7 +50,7 @@ def _lines_of_info(facts: dict[str, Any], unit: str) -> Iterator[str]:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell rate",
         "winchkit cell rate A --for 1s",
@@ -60,7 +60,7 @@ def _lines_of_info(facts: dict[str, Any], unit: str) -> Iterator[str]:
 @click.option(
     "--for",
     "duration",
-    type=Quantity("time", example="3 s"),
+    type=QuantityType("time", example="3 s"),
     default="3 s",
     show_default=True,
     help="Duration of the measurement.",

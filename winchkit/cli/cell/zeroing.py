@@ -11,10 +11,10 @@ from typing import Any
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import yes_option
 from winchkit.cli.core.output import tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 
 _TASKS = {
     (False, False): "host tare",
@@ -26,7 +26,7 @@ _TASKS = {
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell tare",
         "winchkit cell tare A --clear",
@@ -36,7 +36,7 @@ _TASKS = {
 @click.option(
     "--for",
     "duration",
-    type=Quantity("time", example="1 s"),
+    type=QuantityType("time", example="1 s"),
     default="1 s",
     show_default=True,
     help="Averaging time.",
@@ -89,7 +89,7 @@ def _told(task: str, result: dict[str, Any], unit: str) -> str:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell zero",
         "winchkit cell zero A -b bench.toml --for 2s",
@@ -99,7 +99,7 @@ def _told(task: str, result: dict[str, Any], unit: str) -> str:
 @click.option(
     "--for",
     "duration",
-    type=Quantity("time", example="1 s"),
+    type=QuantityType("time", example="1 s"),
     default="1 s",
     show_default=True,
     help="Averaging time.",
@@ -128,7 +128,7 @@ def _lines_of_zero(name: str, result: dict[str, Any], unit: str) -> Iterator[str
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit cell store A -y --command 'store'",
         "winchkit cell store A -b bench.toml -y --json",

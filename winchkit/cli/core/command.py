@@ -64,7 +64,7 @@ class _WithExamples(click.Command):
                     formatter.write(f"{'':{formatter.current_indent}}{example.line}\n")
 
 
-class Command(_WithExamples):
+class ToolCommand(_WithExamples):
     """A command that does something."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -111,7 +111,7 @@ class Command(_WithExamples):
 class Group(_WithExamples, click.Group):
     """A group of commands."""
 
-    command_class = Command
+    command_class = ToolCommand
 
 
 def _variable(param: click.Parameter) -> str:

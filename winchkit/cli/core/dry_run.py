@@ -18,7 +18,7 @@ from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.remote.operations import Station
-    from winchkit.drivers.can.tools.decode import Decoded, KnownNode
+    from winchkit.drivers.can.tools.decode import DecodedFrame, KnownNode
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.sim_platform import PlatformTruth
     from winchkit.schema.simbench import SimBench
@@ -33,7 +33,7 @@ _NOISE = 0.1
 
 
 @dataclass(frozen=True)
-class Frame:
+class PlannedFrame:
     """A frame that would be sent."""
 
     time: float
@@ -71,7 +71,7 @@ def station_for(
             yield station
         return
     spec = spec.with_effects(effects)
-    frames: list[Frame] = []
+    frames: list[PlannedFrame] = []
     with _rehearsal(spec, frames, tension, platform=platform) as station:
         yield station
     show_frames(frames, nodes_of(spec))
@@ -92,18 +92,20 @@ def nodes_of(spec: BenchSpec) -> dict[str, dict[int, KnownNode]]:
     return nodes
 
 
-def writes(bus: str, node: int, values: Iterable[tuple[int, int, bytes]]) -> list[Frame]:
+def writes(bus: str, node: int, values: Iterable[tuple[int, int, bytes]]) -> list[PlannedFrame]:
     """Frames that write objects (index, sub-index, bytes) by SDO, one after another."""
     from winchkit.drivers.can.tools.decode import write_frames
 
     return [
-        Frame(0.0, bus, identifier, data)
+        PlannedFrame(0.0, bus, identifier, data)
         for index, sub, value in values
         for identifier, data in write_frames(node, index, sub, value)
     ]
 
 
-def show_frames(frames: Sequence[Frame], nodes: Mapping[str, Mapping[int, KnownNode]]) -> None:
+def show_frames(
+    frames: Sequence[PlannedFrame], nodes: Mapping[str, Mapping[int, KnownNode]]
+) -> None:
     """Print frames in words; as JSON all of them, else cyclic ones where they change."""
     from winchkit.drivers.can.tools.decode import decode
 
@@ -128,10 +130,10 @@ def show_frames(frames: Sequence[Frame], nodes: Mapping[str, Mapping[int, KnownN
     click.echo("dry run: nothing was sent", err=True)
 
 
-def _digest(decoded: Sequence[tuple[Frame, Decoded]]) -> Iterator[str]:
+def _digest(decoded: Sequence[tuple[PlannedFrame, DecodedFrame]]) -> Iterator[str]:
     """A line for each frame; cyclic ones between changes of a control word are summed up."""
     words: dict[tuple[str, int], float | None] = {}
-    quiet: list[Decoded] = []
+    quiet: list[DecodedFrame] = []
     for frame, item in decoded:
         key = (frame.bus, frame.identifier)
         control = item.values.get(_CONTROL_WORD)
@@ -146,7 +148,7 @@ def _digest(decoded: Sequence[tuple[Frame, Decoded]]) -> Iterator[str]:
     yield from _summed(quiet)
 
 
-def _summed(items: Sequence[Decoded]) -> Iterator[str]:
+def _summed(items: Sequence[DecodedFrame]) -> Iterator[str]:
     """How many frames there were, and between which values their targets lay."""
     if not items:
         return
@@ -166,7 +168,7 @@ def _summed(items: Sequence[Decoded]) -> Iterator[str]:
 
 @contextmanager
 def _rehearsal(
-    spec: BenchSpec, frames: list[Frame], tension: float | None, *, platform: bool
+    spec: BenchSpec, frames: list[PlannedFrame], tension: float | None, *, platform: bool
 ) -> Iterator[Station]:
     """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
@@ -200,13 +202,13 @@ def _rehearsal(
             station.close()
 
 
-def _tap(bus: str, start: float, frames: list[Frame]) -> Callable[[Carried], None]:
+def _tap(bus: str, start: float, frames: list[PlannedFrame]) -> Callable[[Carried], None]:
     """Collects the frames of the host on one bus, with times since ``start``."""
 
     def take(carried: Carried) -> None:
         if not carried.from_drive:
             time = carried.time - start
-            frames.append(Frame(time, bus, carried.identifier, carried.data))
+            frames.append(PlannedFrame(time, bus, carried.identifier, carried.data))
 
     return take
 

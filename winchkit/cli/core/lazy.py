@@ -20,7 +20,7 @@ _SHARED = ("bench", "profile", "quiet", "verbose")
 """Options with one further variable for all commands, such as WINCHKIT_BENCH."""
 
 
-class At(NamedTuple):
+class CommandPlace(NamedTuple):
     """Where a command is found, and its help in one line."""
 
     module: str
@@ -29,7 +29,7 @@ class At(NamedTuple):
     """Of the click command within the module."""
 
 
-Found = Callable[[], Iterable[tuple[str, str, At]]]
+Found = Callable[[], Iterable[tuple[str, str, CommandPlace]]]
 """Section, name and place of commands that are declared elsewhere."""
 
 
@@ -42,8 +42,8 @@ class LazyGroup(Group):
     def __init__(
         self,
         *args: Any,
-        table: Mapping[str, At] | None = None,
-        sections: Mapping[str, Mapping[str, At]] | None = None,
+        table: Mapping[str, CommandPlace] | None = None,
+        sections: Mapping[str, Mapping[str, CommandPlace]] | None = None,
         further: Found = tuple,
         foreign: Found = tuple,
         **options: Any,
@@ -54,7 +54,7 @@ class LazyGroup(Group):
         self._further, self._foreign = further, foreign
 
     @cached_property
-    def sections(self) -> Mapping[str, Mapping[str, At]]:
+    def sections(self) -> Mapping[str, Mapping[str, CommandPlace]]:
         """Listed commands by subject."""
         found = {title: dict(entries) for title, entries in self._sections.items()}
         for title, name, at in self._further():
@@ -62,7 +62,7 @@ class LazyGroup(Group):
         return found
 
     @property
-    def table(self) -> Mapping[str, At]:
+    def table(self) -> Mapping[str, CommandPlace]:
         """Listed commands by name."""
         return {name: at for section in self.sections.values() for name, at in section.items()}
 
@@ -82,7 +82,7 @@ class LazyGroup(Group):
             _name_variables(command, f"{ctx.auto_envvar_prefix}_{cmd_name}")
         return command
 
-    def _place(self, name: str) -> At | None:
+    def _place(self, name: str) -> CommandPlace | None:
         found = self._own.get(name) or self.table.get(name)
         return found or next((at for _, known, at in self._foreign() if known == name), None)
 

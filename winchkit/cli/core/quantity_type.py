@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 
-class Quantity(click.ParamType):  # type: ignore[type-arg]
+class QuantityType(click.ParamType):  # type: ignore[type-arg]
     """A number with a unit of one of some dimensions.
 
     It stays the text that was typed, which messages repeat; the command converts it to SI by

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
-    from winchkit.drivers.can.bus.load import Load
+    from winchkit.drivers.can.bus.load import BusLoad
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit busload bench.toml",
         "winchkit busload bench.toml --json",
@@ -42,7 +42,7 @@ def command(ctx: click.Context, bench: str) -> None:
     ctx.exit(0 if all(load.share <= ADVISED for load in found.values()) else 1)
 
 
-def _trees(found: dict[str, Load]) -> dict[str, Any]:
+def _trees(found: dict[str, BusLoad]) -> dict[str, Any]:
     return {
         name: {
             "bitrate": load.bitrate,
@@ -55,7 +55,7 @@ def _trees(found: dict[str, Load]) -> dict[str, Any]:
     }
 
 
-def _lines(name: str, load: Load) -> Iterator[str]:
+def _lines(name: str, load: BusLoad) -> Iterator[str]:
     fastest = load.fastest()
     yield (
         f"bus {name}: {load.share:.1%} of {load.bitrate / 1000:g} kbit/s at a cycle of "

@@ -24,7 +24,7 @@ from winchkit.cli.core.options import (
 from winchkit.cli.core.output import is_json, json_flag, tell
 
 if TYPE_CHECKING:
-    from winchkit.cli.core.dry_run import Frame
+    from winchkit.cli.core.dry_run import PlannedFrame
     from winchkit.drivers.can.canopen.node import Objects
     from winchkit.drivers.can.tools.config import Difference
 
@@ -230,7 +230,7 @@ def _show(choice: BusChoice, who: str, values: list[tuple[int, int, bytes]]) -> 
 
     spec = choice.spec()
     drive = declared_drive(spec, who)
-    frames: list[Frame] = writes(drive.bus, drive.node, values)
+    frames: list[PlannedFrame] = writes(drive.bus, drive.node, values)
     show_frames(frames, nodes_of(spec))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_device, complete_winch
 from winchkit.cli.core.options import BusChoice, bus_options
 from winchkit.cli.core.output import json_flag, tell
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit info A -b bench.toml",
         Example("winchkit info 5 --interface socketcan --channel can0", "needs a CAN adapter"),

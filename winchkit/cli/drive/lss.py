@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Example, Group
-from winchkit.cli.core.dry_run import Frame, show_frames
+from winchkit.cli.core.dry_run import PlannedFrame, show_frames
 from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import UsageError
@@ -31,20 +31,20 @@ def rehearsed() -> Iterator[LssLine]:
     """An LSS line to nowhere; its frames are shown at the end."""
     from winchkit.drivers.can.canopen.lss import LssLine
 
-    network = _Network()
+    network = _LssBus()
     line = LssLine(network)
     yield line
     line.close()
     show_frames(network.frames, {})
 
 
-class _Network:
+class _LssBus:
     """Stands for a bus, its network and the device on it."""
 
     def __init__(self) -> None:
         self.name = _BUS
         self.network: Any = self
-        self.frames: list[Frame] = []
+        self.frames: list[PlannedFrame] = []
         from canopen.lss import LssMaster
 
         master: Any = LssMaster()
@@ -56,7 +56,7 @@ class _Network:
 
     def send_message(self, identifier: int, data: bytes) -> None:
         """Note a frame; say yes to what wants an answer."""
-        self.frames.append(Frame(0.0, _BUS, identifier, bytes(data)))
+        self.frames.append(PlannedFrame(0.0, _BUS, identifier, bytes(data)))
         if data[0] in _ANSWERED:
             answer = bytes((_SELECTED.get(data[0], data[0]),)).ljust(8, b"\0")
             self.lss.on_message_received(0x7E4, answer, 0.0)

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import BusChoice, bus_options
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import NoReply
 
 if TYPE_CHECKING:
-    from winchkit.drivers.can.tools.scan import Found
+    from winchkit.drivers.can.tools.scan import ScannedNode
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit scan -b bench.toml",
         Example("winchkit scan --interface socketcan --channel can0", "needs a CAN adapter"),
@@ -47,7 +47,7 @@ def command(**bus: Any) -> None:
         raise NoReply(f"{spec.name}: no node answers; check power, wiring, termination, bit rate")
 
 
-def _line(item: Found) -> str:
+def _line(item: ScannedNode) -> str:
     problem = f"; {item.problem}" if item.problem else ""
     if item.device_type is None:
         return f"{item.bus} node {item.node}: {item.heartbeat}{problem}"

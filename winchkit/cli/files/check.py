@@ -11,7 +11,7 @@ import click
 
 from winchkit import wings
 from winchkit.arguments import require_type
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import TABLE, effects_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
@@ -49,7 +49,7 @@ class Verdict:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit check better.toml bench.toml demo-*.csv",
         "winchkit check - < better.toml",

@@ -65,9 +65,9 @@ def report_of(value: object) -> DriveReport:
 
 def _units_of(servo: ServoSpec) -> str:
     """An example of the units of a device file, to be compared with the manual."""
-    from winchkit.drivers.can.cia402.units import Units, scale_of
+    from winchkit.drivers.can.cia402.units import UnitObjects, scale_of
 
-    scale = scale_of(Units(), servo)
+    scale = scale_of(UnitObjects(), servo)
     turn, speed = 2 * pi / scale.angle, _EXAMPLE * 2 * pi / 60 / scale.velocity
     unless = "" if servo.units == "file" else ", unless its objects 608Fh to 60A9h say otherwise"
     return (

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 
 _SHELLS = ("bash", "zsh", "fish")
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit completion bash",
         "winchkit completion fish > winchkit.fish",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -13,7 +13,7 @@ from winchkit.cli.model.options import runs_argument
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit export demo-10kg-1.csv -o run.mcap",
         "winchkit export lift.mcap -o lift.csv",

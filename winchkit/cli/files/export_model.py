@@ -8,14 +8,14 @@ from typing import Literal
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import PROFILE, effects_option, output_option
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit export-model better.toml --to c -o better.h",
         "winchkit export-model joint-axis --to mjcf -o joint.xml",
@@ -31,7 +31,7 @@ from winchkit.cli.core.quantity_type import Quantity
 )
 @click.option(
     "--load-mass",
-    type=Quantity("mass", example="10 kg"),
+    type=QuantityType("mass", example="10 kg"),
     help="Mass on the cable, for MuJoCo.",
 )
 @effects_option

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import is_quiet, note, suggest_next
 from winchkit.cli.core.options import TABLE, device_option, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import Quantity, naming
+from winchkit.cli.core.quantity_type import QuantityType, naming
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
 from winchkit.cli.files.import_runs import inspected, targets_in, targets_of, write_runs
@@ -22,13 +22,13 @@ from winchkit.errors import Fault, FileError, RunError, UsageError
 
 if TYPE_CHECKING:
     from winchkit.runs.importing.assignment import Guess
-    from winchkit.runs.importing.table import Table
+    from winchkit.runs.importing.table import ColumnTable
     from winchkit.schema.mapping import ImportMapping
 
 _MAPPING = "mapping.toml"
 
 
-class _Written(Quantity):
+class _Written(QuantityType):
     """A quantity as people write it, ``2,4 Nm``, in winchkit's spelling."""
 
     def convert(
@@ -45,7 +45,7 @@ class _Written(Quantity):
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit import logger.csv",
         "winchkit import logger.csv -o runs -y --load-mass '10 kg'",
@@ -145,7 +145,7 @@ class _Written(Quantity):
     "load_masses",
     multiple=True,
     metavar="MASS",
-    type=Quantity("mass", example="10 kg"),
+    type=QuantityType("mass", example="10 kg"),
     help="Mass on the cable, e.g. '10 kg': one for all runs, or one for each FILE in order.",
 )
 @device_option
@@ -153,7 +153,7 @@ class _Written(Quantity):
 @click.option(
     "--lag",
     metavar="TIME",
-    type=Quantity("time", example="-0.02 s", signed=True),
+    type=QuantityType("time", example="-0.02 s", signed=True),
     help="Clock of the first FILE less that of the others; '0 s': one clock.",
 )
 @click.option("--replace", "overwrite", is_flag=True, help="Write over earlier runs.")
@@ -270,7 +270,7 @@ def _lag(text: str | None) -> float | None:
     return -value if negative else value
 
 
-def _tables(files: Sequence[str], devices: Sequence[str]) -> list[Table]:
+def _tables(files: Sequence[str], devices: Sequence[str]) -> list[ColumnTable]:
     """Columns of every file, those of traces of CAN frames by their devices; all faults at once."""
     from winchkit.can_trace import trace_advice
     from winchkit.cli.files.import_trace import read_trace_table

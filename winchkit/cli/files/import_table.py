@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from winchkit.runs.importing.assignment import Assignment, Guess
-    from winchkit.runs.importing.table import Column
+    from winchkit.runs.importing.table import FileColumn
 
 _WIDEST = 24
 """Characters of a name or of values, so that a row fits on a usual terminal."""
@@ -93,7 +93,7 @@ def tables_text(group: Sequence[Guess]) -> str:
     return "\n".join([title, *body, *notes])
 
 
-def _row(item: Assignment, column: Column) -> tuple[str, ...]:
+def _row(item: Assignment, column: FileColumn) -> tuple[str, ...]:
     from winchkit.effects.card import sparkline
 
     name = one_line(item.source)

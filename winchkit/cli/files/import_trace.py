@@ -11,7 +11,7 @@ from winchkit.errors import Fault, NotPermitted, RunError
 if TYPE_CHECKING:
     from winchkit.can_trace import TraceFrame
     from winchkit.drivers.can.tools.trace_decoder import TracedNode
-    from winchkit.runs.importing.table import Column, Table
+    from winchkit.runs.importing.table import ColumnTable, FileColumn
 
 _DRIVE = {
     "6064h": ("motor_angle", "rad", "angle"),
@@ -27,7 +27,7 @@ _KINDS = ("TPDO", "SDO")
 Samples = list[tuple[float, float]]
 
 
-def read_trace_table(path: str, devices: Sequence[str]) -> Table:
+def read_trace_table(path: str, devices: Sequence[str]) -> ColumnTable:
     """Values that the devices of a trace sent, a group of columns for each PDO.
 
     Those of a drive with a device file are in SI, by the units that the trace shows or else those
@@ -36,7 +36,7 @@ def read_trace_table(path: str, devices: Sequence[str]) -> Table:
     """
     from winchkit.drivers.can.tools.decode import named
     from winchkit.drivers.can.tools.decoded_trace import decode_trace
-    from winchkit.runs.importing.table import Table, named_apart
+    from winchkit.runs.importing.table import ColumnTable, named_apart
 
     trace = decode_trace(path, devices)
     found: dict[tuple[str, int, str], list[tuple[TraceFrame, dict[str, float]]]] = {}
@@ -52,7 +52,7 @@ def read_trace_table(path: str, devices: Sequence[str]) -> Table:
     if any(math.isnan(rows[0][0].time) for rows in found.values()):
         text = "has no times, without which there is no run; record it by candump -L"
         raise RunError(Fault(text, path))
-    columns: list[Column] = []
+    columns: list[FileColumn] = []
     scaled = {key: _scaled(path, one, notes) for key, one in trace.nodes.items()}
     buses = list(dict.fromkeys(bus for bus, _, _ in found))
     if len(buses) > 1:
@@ -69,7 +69,7 @@ def read_trace_table(path: str, devices: Sequence[str]) -> Table:
             known = {name: (f"{label} {one[0]}", one[1], one[2]) for name, one in known.items()}
         columns += _columns(f"{label} {what}", rows, known)
     layout = f"trace of CAN frames ({trace.layout})"
-    return Table(path, layout, named_apart(columns), notes=tuple(dict.fromkeys(notes)))
+    return ColumnTable(path, layout, named_apart(columns), notes=tuple(dict.fromkeys(notes)))
 
 
 def _scaled(path: str, one: TracedNode, notes: list[str]) -> dict[str, tuple[str, str, float]]:
@@ -105,11 +105,11 @@ def _columns(
     group: str,
     rows: Sequence[tuple[TraceFrame, dict[str, float]]],
     known: dict[str, tuple[str, str, float]],
-) -> Iterator[Column]:
+) -> Iterator[FileColumn]:
     """Time and values of one PDO, or of one object that is read by SDO."""
     import numpy as np
 
-    from winchkit.runs.importing.table import Column
+    from winchkit.runs.importing.table import FileColumn
 
     names = dict.fromkeys(name for _, values in rows for name in values)
     parts = [names] if "SDO" not in group else [[name] for name in names]
@@ -117,8 +117,8 @@ def _columns(
         own = [(frame.time, values) for frame, values in rows if not values.keys().isdisjoint(part)]
         place = group if len(parts) == 1 else f"{group} {next(iter(part))}"
         times = np.array([time for time, _ in own])
-        yield Column("time", times, "s", (place,), group=place)
+        yield FileColumn("time", times, "s", (place,), group=place)
         for name in part:
             channel, unit, factor = known[name]
             numbers = np.array([values.get(name, math.nan) for _, values in own], dtype=np.float64)
-            yield Column(channel, factor * numbers, unit, group=place)
+            yield FileColumn(channel, factor * numbers, unit, group=place)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import TABLE, device_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -17,13 +17,13 @@ from winchkit.errors import one_line
 
 if TYPE_CHECKING:
     from winchkit.can_trace import TraceFrame
-    from winchkit.drivers.can.tools.decode import Decoded
+    from winchkit.drivers.can.tools.decode import DecodedFrame
 
 _KINDS = ("NMT", "SYNC", "EMCY", "TPDO", "RPDO", "SDO", "heartbeat", "LSS", "other")
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit log decode candump.log --device maxon-epos4",
         "winchkit log decode bus.trc --device 1=drive.eds --device 9=generic-cia404 --only SDO",
@@ -73,13 +73,13 @@ def command(*, file: str, devices: Sequence[str], kinds: Sequence[str]) -> None:
     )
 
 
-def _line(frame: TraceFrame, words: Decoded, *, has_buses: bool) -> str:
+def _line(frame: TraceFrame, words: DecodedFrame, *, has_buses: bool) -> str:
     time = f"line {frame.line:>7}" if math.isnan(frame.time) else f"{frame.time:12.6f}"
     bus = f"{frame.bus} " if has_buses else ""
     return f"{time}  {one_line(bus)}{frame.identifier:03X}  {words.kind:9}  {one_line(words.text)}"
 
 
-def _entry(frame: TraceFrame, words: Decoded) -> dict[str, object]:
+def _entry(frame: TraceFrame, words: DecodedFrame) -> dict[str, object]:
     return {
         "line": frame.line,
         "time": None if math.isnan(frame.time) else frame.time,

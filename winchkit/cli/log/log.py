@@ -14,11 +14,11 @@ import click
 from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.completion import complete_bench
 from winchkit.cli.core.early_checks import check_output
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_by_default, effects_option, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError, WinchkitError
 
 if TYPE_CHECKING:
@@ -27,11 +27,17 @@ if TYPE_CHECKING:
     from winchkit.bench.remote.operations import Station
 
 COMMANDS = {
-    "decode": At("winchkit.cli.log.decode", "Print a trace of CAN frames in words."),
-    "info": At("winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."),
-    "recover": At("winchkit.cli.log.recover", "Save what is whole of a log that was cut off."),
-    "export": At("winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."),
-    "replay": At("winchkit.cli.log.replay", "Play a log as if it came from the bench."),
+    "decode": CommandPlace("winchkit.cli.log.decode", "Print a trace of CAN frames in words."),
+    "info": CommandPlace(
+        "winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."
+    ),
+    "recover": CommandPlace(
+        "winchkit.cli.log.recover", "Save what is whole of a log that was cut off."
+    ),
+    "export": CommandPlace(
+        "winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."
+    ),
+    "replay": CommandPlace("winchkit.cli.log.replay", "Play a log as if it came from the bench."),
 }
 _CHECK_PERIOD = 0.1
 """s between two looks at the recorder, so that a full disk is reported at once."""
@@ -62,14 +68,14 @@ _SHOW_PERIOD = 0.5
     "--for",
     "duration",
     metavar="TIME",
-    type=Quantity("time", example="10 s"),
+    type=QuantityType("time", example="10 s"),
     help="End after this time, e.g. 10s or '2 min'.",
 )
 @click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
 @click.option(
     "--period",
-    type=Quantity("time", example="0.02 s"),
+    type=QuantityType("time", example="0.02 s"),
     default="0.02 s",
     show_default=True,
     help="Time between two live pictures.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import RUN, output_option
 from winchkit.cli.core.output import json_flag, tell
@@ -13,7 +13,7 @@ from winchkit.errors import UsageError
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit log recover cut.mcap",
         "winchkit log recover cut.mcap -o whole.mcap --json",

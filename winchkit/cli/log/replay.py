@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import RUN
 
@@ -23,7 +23,7 @@ _SHOW_PERIOD = 0.1
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit log replay lift.mcap --fast",
         "winchkit log replay lift.mcap --fast --jsonl",

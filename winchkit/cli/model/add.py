@@ -81,9 +81,9 @@ def command(
         write_page(html, page)
     if figures:
         from winchkit.report.pages.pages import addition_figures
-        from winchkit.report.reproducibility import Command
+        from winchkit.report.reproducibility import CommandLine
 
-        source = Command(fitted.regression.dataset, asked.profile).source
+        source = CommandLine(fitted.regression.dataset, asked.profile).source
         write_figures(figures, addition_figures(fitted, source))
     suggest_with("compare", asked, runs, profile=output)
 

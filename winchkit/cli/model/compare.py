@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import is_verbose
 from winchkit.cli.core.output import is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit compare demo-*.csv -p bench-spiral",
         "winchkit compare demo-*.csv -p better.toml --html errors.html",
@@ -62,7 +62,7 @@ def command(
     """
     from winchkit.diagnosis.compare import WinchCompared, compared
     from winchkit.report.pages.pages import comparison_figures, comparison_html
-    from winchkit.report.reproducibility import Command
+    from winchkit.report.reproducibility import CommandLine
     from winchkit.report.simulated import simulated_figures, simulated_text
     from winchkit.report.text import compare_text
     from winchkit.schema.profiles.winch import WinchProfile
@@ -93,7 +93,7 @@ def command(
         title = page_title(declared.name, runs)
         write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
     if figures:
-        source = Command(answer.regression.dataset, asked.profile).source
+        source = CommandLine(answer.regression.dataset, asked.profile).source
         more = simulated_figures(answer, errors) if isinstance(answer, WinchCompared) else []
         write_figures(figures, [*comparison_figures(answer, source), *more])
     suggest_with("diagnose", asked, runs)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import is_verbose, suggest_next
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit diagnose demo-*.csv -p bench-spiral",
         "winchkit diagnose demo-*.csv -p better.toml --html report.html",
@@ -123,9 +123,11 @@ def _tell_one(
 def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:
     """Figures of the page of an answer."""
     from winchkit.report.pages.pages import report_figures
-    from winchkit.report.reproducibility import Command
+    from winchkit.report.reproducibility import CommandLine
 
-    return report_figures(answer, Command(answer.engine.regression.dataset, asked.profile).source)
+    return report_figures(
+        answer, CommandLine(answer.engine.regression.dataset, asked.profile).source
+    )
 
 
 def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_effect, complete_file
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import echo_json, is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
@@ -47,10 +47,12 @@ class _Effects(LazyGroup):
     "effects",
     cls=_Effects,
     table={
-        "show": At(
+        "show": CommandPlace(
             "winchkit.cli.model.effects", "List the effects, or show the card of one.", "show"
         ),
-        "new": At("winchkit.cli.model.effects", "Write a file for an effect of your own.", "new"),
+        "new": CommandPlace(
+            "winchkit.cli.model.effects", "Write a file for an effect of your own.", "new"
+        ),
     },
     examples=(
         "winchkit effects",
@@ -67,7 +69,7 @@ def command() -> None:
 
 @click.command(
     "show",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit effects show cable-creep",
         "winchkit effects show runout",

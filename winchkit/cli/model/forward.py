@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import PROFILE, PROGRAMME, RUN, effects_option, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import progress_bar
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit forward better.toml --torque demo-10kg-1.csv -o forward.csv",
         "winchkit forward better.toml --torque demo-20kg-1.csv -o forward-20kg.csv",
@@ -29,7 +29,7 @@ from winchkit.cli.core.terminal import progress_bar
 )
 @click.option(
     "--load-mass",
-    type=Quantity("mass", example="10 kg"),
+    type=QuantityType("mass", example="10 kg"),
     help="Mass on the cable; by default that of the run or the programme.",
 )
 @click.option(
@@ -37,7 +37,7 @@ from winchkit.cli.core.terminal import progress_bar
 )
 @click.option(
     "--rate",
-    type=Quantity("frequency", example="100 Hz"),
+    type=QuantityType("frequency", example="100 Hz"),
     default="100 Hz",
     show_default=True,
     help="Sampling rate of a programme.",

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from winchkit.catalog import find
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import json_flag, tell
@@ -17,7 +17,7 @@ from winchkit.errors import UsageError
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit ledger -p better.toml",
         "winchkit ledger -p better.toml --html ledger.html",
@@ -40,7 +40,7 @@ def command(profile: str, html: str | None) -> None:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit undo -p better.toml",
         "winchkit undo -p better.toml -o before.toml",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
@@ -142,7 +142,7 @@ class Asked:
         return tuple(out)
 
 
-class ManyValues(Command):
+class ManyValues(ToolCommand):
     """A command whose options shown as ``RUN...`` take several values: ``--fit a.csv b.csv``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import files_of_kind
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import BENCH, output_option
@@ -38,7 +38,7 @@ _FEW = 2
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit plan demo-*.csv -p bench-spiral",
         "winchkit plan demo-*.csv -p bench-spiral -b bench.toml -o next.toml",

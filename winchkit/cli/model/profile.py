@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_output
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.model.options import json_option
 from winchkit.errors import UsageError
@@ -37,7 +37,9 @@ _SECTIONS = """\
 @click.group(
     "profile",
     cls=LazyGroup,
-    table={"new": At("winchkit.cli.model.profile", "Write a profile from a drawing.", "new")},
+    table={
+        "new": CommandPlace("winchkit.cli.model.profile", "Write a profile from a drawing.", "new")
+    },
     examples=(
         "winchkit profile new --help",
         "winchkit profile new my-drum.toml --drum-kind grooved --drum-winding-radius 60mm"
@@ -60,7 +62,7 @@ def _options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit profile new my-winch.toml --drum-kind spiral --drum-winding-radius 60mm"
         " --cable-diameter 4mm --gearbox-ratio 20.4 --pulley 40mm,90deg",

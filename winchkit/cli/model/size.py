@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import TABLE
 from winchkit.cli.core.output import json_flag, tell
 
@@ -19,7 +19,7 @@ _SHOWN = {"m": ("mm", 1e-3), "rad/s": ("rpm", 0.10471975511965977)}
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit size winding-device.toml", exit_code=1),
         Example("winchkit size winding-device.toml --json", exit_code=1),

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 
 if TYPE_CHECKING:
-    from winchkit.cli.sim.demo_loop import Findings
+    from winchkit.cli.sim.demo_loop import LoopResult
     from winchkit.diagnosis.results import Comparison
 
 _RECORDING_SECONDS = 62.0
@@ -32,7 +32,7 @@ _OPENING = (
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit demo", _LONG),
         Example("winchkit demo --seed 3 -o demo-3 --json", _LONG),
@@ -116,7 +116,7 @@ class _Story:
         click.echo(textwrap.fill(text, 80, subsequent_indent="  "), err=self._quiet)
 
 
-def _add_errors(story: _Story, comparison: Comparison, findings: Findings) -> None:
+def _add_errors(story: _Story, comparison: Comparison, findings: LoopResult) -> None:
     from winchkit.report.words.headline import size_texts
     from winchkit.report.words.sentence import capital
     from winchkit.report.words.vocabulary import OUTPUT_NAMES
@@ -129,7 +129,7 @@ def _add_errors(story: _Story, comparison: Comparison, findings: Findings) -> No
 
 
 def _write_report(
-    out: Path, story: _Story, findings: Findings, profile_name: str, hidden: str
+    out: Path, story: _Story, findings: LoopResult, profile_name: str, hidden: str
 ) -> Path:
     from winchkit.cli.model.options import save_page
     from winchkit.report.pages.pages import report_html
@@ -147,7 +147,7 @@ def _write_report(
 
 
 def _outcome(
-    seed: int, findings: Findings, truth: tuple[str, ...], seconds: float, out: Path
+    seed: int, findings: LoopResult, truth: tuple[str, ...], seconds: float, out: Path
 ) -> dict[str, Any]:
     addition = findings.addition
     return {

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import WinchAnswer
     from winchkit.runs.run import Run
-    from winchkit.schema.programme import Programme, Step
+    from winchkit.schema.programme import Programme, ProgrammeStep
     from winchkit.schema.simbench import SimBench
 
 ProgressCallback = Callable[[str, float], None]
@@ -29,7 +29,7 @@ _APPROACH = 0.5
 
 
 @dataclass(frozen=True)
-class Findings:
+class LoopResult:
     """Result of the loop, without knowledge of the hidden effect."""
 
     answer: WinchAnswer
@@ -87,7 +87,7 @@ def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -
     clock = SimulatedClock()
     start = clock.now()
 
-    def progress(repeat: int, _number: int, step: Step) -> None:
+    def progress(repeat: int, _number: int, step: ProgrammeStep) -> None:
         report(f"repeat {repeat}: {_words(step)}", clock.now() - start)
 
     with LiveBench(bench, seed=seed, simulated_time=clock) as live:
@@ -107,7 +107,7 @@ def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -
     return written
 
 
-def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
+def learn(runs: list[Run], profile_name: str, out: Path) -> LoopResult:
     """Diagnose recorded runs, add the named effect to a copy of the profile, and fit it."""
     from winchkit.diagnosis.add import add
     from winchkit.diagnosis.diagnose import diagnose
@@ -120,10 +120,10 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> Findings:
     profile = read_profile(nominal)
     answer = diagnose(runs, profile)
     if not answer.diagnosis.steps:
-        return Findings(answer, None)
+        return LoopResult(answer, None)
     addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
     write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
-    return Findings(answer, addition)
+    return LoopResult(answer, addition)
 
 
 def _go_to_start(opened: Bench, programme: Programme) -> None:
@@ -134,7 +134,7 @@ def _go_to_start(opened: Bench, programme: Programme) -> None:
             winch.move_to(last.to, speed=_APPROACH)
 
 
-def _words(step: Step) -> str:
+def _words(step: ProgrammeStep) -> str:
     if step.ask is not None:
         return step.ask
     if step.hold is not None:

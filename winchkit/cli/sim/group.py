@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.command import ToolCommand
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.output import json_flag, tell
 
 COMMANDS = {
-    "record": At("winchkit.cli.sim.record", "Run programmes without buses and write the runs."),
-    "serve": At("winchkit.cli.sim.serve", "Run a simulated bench live, with its buses."),
-    "list": At(
+    "record": CommandPlace(
+        "winchkit.cli.sim.record", "Run programmes without buses and write the runs."
+    ),
+    "serve": CommandPlace("winchkit.cli.sim.serve", "Run a simulated bench live, with its buses."),
+    "list": CommandPlace(
         "winchkit.cli.sim.group", "List simulated benches, or what they can hide.", "benches"
     ),
 }
@@ -31,7 +33,7 @@ def command() -> None:
 
 @click.command(
     "list",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit sim list",
         "winchkit sim list --physics --json",
@@ -45,6 +47,6 @@ def benches(physics: bool) -> None:
     from winchkit.sim.physics.table import listed_physics
 
     rows = listed_physics() if physics else listed_benches()
-    width = max((len(str(row["name"])) for row in rows), default=0)
-    lines = (f"{row['name']:<{width}}  {row['description']}" for row in rows)
+    width = max((len(row.name) for row in rows), default=0)
+    lines = (f"{row.name:<{width}}  {row.description}" for row in rows)
     tell({"physics" if physics else "benches": rows}, lines)

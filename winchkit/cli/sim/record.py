@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit import wings
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import UsageError
 
@@ -26,7 +26,7 @@ _RATE = 50.0
 
 @click.command(
     "record",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit sim record demo-elastic-rope programme-demo -o runs",
         "winchkit sim record spiral-bench short.toml --seed 3 --hidden 'elastic rope'",
@@ -45,7 +45,7 @@ _RATE = 50.0
 @click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
 @click.option(
     "--rate",
-    type=Quantity("frequency", example="50 Hz"),
+    type=QuantityType("frequency", example="50 Hz"),
     help=f"Sampling rate, by default {_RATE:g} Hz; a robot's log has the rows of its bench.",
 )
 @output_option(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_sim_bench
 from winchkit.cli.core.output import json_flag, tell
 
@@ -29,7 +29,7 @@ _DETERMINED = 6
 
 @click.command(
     "serve",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit sim serve demo-elastic-rope",
         "winchkit sim serve spiral-bench -o bench.toml --seed 3",

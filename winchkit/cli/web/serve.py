@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from winchkit.catalog import find
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
 from winchkit.cli.core.early_checks import check_bench, check_file
 from winchkit.cli.core.options import PROFILE, RUN
@@ -18,7 +18,7 @@ from winchkit.errors import UsageError
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit serve demo-*.csv -p bench-spiral", "serves until Ctrl-C"),
         Example("winchkit serve --sim demo-elastic-rope --no-browser", "serves until Ctrl-C"),

@@ -18,8 +18,8 @@ from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.low_pass import (
-    Compared,
     RemovedBand,
+    UnfilteredOutput,
     cut_offs_of,
     removed_by_low_pass,
 )
@@ -36,7 +36,7 @@ from winchkit.diagnosis.data.zeroing import angles_from_zero, as_noise, is_setti
 from winchkit.diagnosis.linear_axis import errors_in_units_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import Fault, RunError, UsageError
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
 from winchkit.quantity_text import quantity
@@ -271,7 +271,7 @@ def _prepared(
 def _removed(runs: Sequence[Run], dataset: Dataset) -> Iterator[RemovedBand]:
     """What the low-passes of every output remove; of decimated runs from the measured output."""
     for output in dataset.outputs:
-        filtered: dict[float, list[Compared]] = {}
+        filtered: dict[float, list[UnfilteredOutput]] = {}
         for run, r in zip(runs, dataset.recordings, strict=True):
             cut_off = r.bands[output].cut_off if output in r.measured else None
             if cut_off is None:
@@ -281,7 +281,7 @@ def _removed(runs: Sequence[Run], dataset: Dataset) -> Iterator[RemovedBand]:
             else:
                 error = np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan)
                 whole = r.signals.motor_angle, r.measured[output], error, r.bands[output].rate
-            filtered.setdefault(cut_off, []).append(Compared(*whole))
+            filtered.setdefault(cut_off, []).append(UnfilteredOutput(*whole))
         for cut_off, compared in filtered.items():
             yield removed_by_low_pass(compared, output, cut_off)
 
@@ -447,13 +447,13 @@ def _nothing_predicted(run: Run, profile: WinchProfile) -> Fault:
     return Fault(f"nothing of {has} can be predicted from this run; {needs}", run.path or run.name)
 
 
-def _clock(run: Run) -> Clock:
-    return Clock(
+def _clock(run: Run) -> SamplingTimes:
+    return SamplingTimes(
         run.time - run.time[0], bridged(run["motor_angle"]), bridged_channel(run, "motor_velocity")
     )
 
 
-def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Signals:
+def _signals(run: Run, profile: WinchProfile, clock: SamplingTimes | None = None) -> Signals:
     has_cable = not isinstance(profile, AxisProfile)
     return Signals(
         time=run.time,

@@ -18,7 +18,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged, gaps
 from winchkit.diagnosis.data.spectrum import LOST_POWER, highest_frequency
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.line import Motion
 from winchkit.model.stages import At
 from winchkit.runs.run import Run
@@ -84,7 +84,7 @@ class Decimation:
         return replace(
             motion,
             at=replace(motion.at, **at),
-            clock=Clock(at["time"]),
+            clock=SamplingTimes(at["time"]),
             load=decimated(motion.load),
             drum_tension=decimated(motion.drum_tension),
             discretization=decimated(motion.discretization),

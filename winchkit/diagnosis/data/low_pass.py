@@ -49,7 +49,7 @@ _LEVEL = 0.01
 
 
 @dataclass(frozen=True)
-class Compared:
+class UnfilteredOutput:
     """One output of one run before the low-pass."""
 
     angle: Array
@@ -73,7 +73,7 @@ class Compared:
         )
 
 
-def torque_cut_off(runs: Sequence[Compared], speed: float, lost: float = 0.0) -> float:
+def torque_cut_off(runs: Sequence[UnfilteredOutput], speed: float, lost: float = 0.0) -> float:
     """Cut-off of the torque's low-pass, Hz, the same for all runs of a sampling rate.
 
     ``runs``: torque of every such run, at least one. ``speed``: highest speed of the motor, rad/s.
@@ -100,7 +100,7 @@ def cut_offs_of(
     samples is too small at high frequencies: 1 % of the power may lie above the cut-off there.
     """
     compared = {
-        index: Compared(
+        index: UnfilteredOutput(
             motion.at.motor_angle,
             run["motor_torque"],
             np.where(still, 0.0, run["motor_torque"] - own["motor_torque"]),
@@ -161,7 +161,9 @@ class RemovedBand:
         return (found,) if self.above_noise else ()
 
 
-def removed_by_low_pass(runs: Sequence[Compared], output: str, cut_off: float) -> RemovedBand:
+def removed_by_low_pass(
+    runs: Sequence[UnfilteredOutput], output: str, cut_off: float
+) -> RemovedBand:
     """What a low-pass with a cut-off in Hz removes from the errors of an output in all runs.
 
     Notes

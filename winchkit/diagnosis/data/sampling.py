@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.runs.run import Run
 
@@ -67,7 +67,7 @@ def even_instants(time: Array, angle: Array) -> Array | None:
     s; None where the stamps are even but for lost samples, or where the restricted likelihood of
     the smoothing spline is larger over the stamps.
     """
-    if Clock(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
+    if SamplingTimes(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
         return None
     instants = _nearest_even(time - time[0])
     step = float(np.median(np.diff(time)))

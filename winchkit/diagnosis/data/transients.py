@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
@@ -65,7 +65,7 @@ def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mas
     return np.asarray(std > _LEAST_TRANSIENT * usual)
 
 
-def with_neighbours(marked: Mask, clock: Clock) -> Mask:
+def with_neighbours(marked: Mask, clock: SamplingTimes) -> Mask:
     """Extend a mask by the samples whose derivatives reach across a marked one."""
     reach = _NEIGHBOURS + clock.support
     return np.asarray(np.convolve(marked, np.ones(2 * reach + 1), mode="same") > 0)

@@ -26,7 +26,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
-from winchkit.schema.programme import Programme, Step
+from winchkit.schema.programme import Programme, ProgrammeStep
 
 _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
@@ -155,7 +155,7 @@ def programme_of(
     ``operating_range``: None for that of the runs so far.
     """
     operating_range = operating_range or range_of_runs(dataset)
-    steps: list[Step] = []
+    steps: list[ProgrammeStep] = []
     for rise in kind.temperature_rises if _has_temperature(dataset) else (0.0,):
         if len(kind.temperature_rises) > 1:
             steps += _temperature_step(dataset, rise)
@@ -165,28 +165,28 @@ def programme_of(
             for share, speed in kind.moves:
                 steps += [
                     _move_step(operating_range.at(share), speed * operating_range.fastest),
-                    Step(hold=kind.hold),
+                    ProgrammeStep(hold=kind.hold),
                 ]
     about = f"{kind.name}; proposed from {len(dataset.recordings)} runs of {dataset.profile.name}"
     return Programme(name, tuple(steps), repeat=_REPEATS, description=about)
 
 
-def _temperature_step(dataset: Dataset, rise: float) -> list[Step]:
+def _temperature_step(dataset: Dataset, rise: float) -> list[ProgrammeStep]:
     """Step that asks for a temperature, in whole degrees Celsius."""
     usual = usual_temperature(dataset)
     if usual is None:
         return []
     target = float(round(usual + rise))
     ask = f"bring cable and machine to {target:g} degC"
-    return [Step(ask=ask, temperature=target)]
+    return [ProgrammeStep(ask=ask, temperature=target)]
 
 
-def _load_step(mass: float | None) -> list[Step]:
+def _load_step(mass: float | None) -> list[ProgrammeStep]:
     """Step that asks for a load, rounded to usual weights."""
     if mass is None:
         return []
     target = max(_WEIGHT_STEP, round(mass / _WEIGHT_STEP) * _WEIGHT_STEP)
-    return [Step(ask=f"hang the {target:g} kg load", load_mass=target)]
+    return [ProgrammeStep(ask=f"hang the {target:g} kg load", load_mass=target)]
 
 
 def _operator_minutes(kind: CandidateProgramme, dataset: Dataset) -> float:
@@ -196,8 +196,8 @@ def _operator_minutes(kind: CandidateProgramme, dataset: Dataset) -> float:
     return warmings * _WARMING_MINUTES + hangs * _LOADING_MINUTES
 
 
-def _move_step(length: float, speed: float) -> Step:
-    return Step(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
+def _move_step(length: float, speed: float) -> ProgrammeStep:
+    return ProgrammeStep(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
 
 
 def _has_temperature(dataset: Dataset) -> bool:

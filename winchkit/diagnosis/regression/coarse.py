@@ -21,9 +21,9 @@ from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.regression.base import Coarse
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.line import Motion
 
 _SAMPLES = 4000
@@ -92,7 +92,7 @@ class CoarseTimeSeries(Coarse):
             starts=tuple(tuple(s[i] for i in self._place) if s else () for s in hypothesis.starts),
         )
 
-    def inverse_sigma(self, noise: Noise) -> Array:
+    def inverse_sigma(self, noise: BandNoise) -> Array:
         """1/σ of every row of the coarse regression, from the whole one's bands."""
         return np.asarray(1 / np.sqrt(noise.power[self._band_of_row]))
 
@@ -133,7 +133,7 @@ def _subsampled(recording: Recording, step: int) -> Recording:
 
 def _subsampled_motion(motion: Motion, step: int) -> Motion:
     at = _every(motion.at, step)
-    return replace(_every(motion, step), at=at, clock=Clock(at.time))
+    return replace(_every(motion, step), at=at, clock=SamplingTimes(at.time))
 
 
 def _every(signals: Sampled, step: int) -> Sampled:

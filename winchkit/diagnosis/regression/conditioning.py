@@ -16,7 +16,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -50,7 +50,7 @@ not added last: where the motion has one speed or one frequency, friction and th
 imitate it."""
 
 
-def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCovariance:
+def value_covariance(regression: Regression, fit: Fit, noise: BandNoise) -> ValueCovariance:
     """Covariance of the nuisance parameters and values of a fit."""
     whitened = whitened_jacobian(regression, fit, noise)
     length = np.sqrt(np.sum(whitened**2, axis=0))
@@ -66,7 +66,7 @@ def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCov
     return ValueCovariance(names, slopes @ covariance @ slopes.T, float(condition))
 
 
-def collinearity(regression: Regression, fit: Fit, noise: Noise, index: int) -> float:
+def collinearity(regression: Regression, fit: Fit, noise: BandNoise, index: int) -> float:
     """Squared length of an effect's change over that of the part which the others cannot imitate.
 
     Returns: variance inflation factor of the effect at its fitted values, 1 where it is orthogonal

@@ -22,7 +22,7 @@ from scipy.special import ndtr
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 
 _TOUCHED = 0.02
 """Blocks whose loss changes by less than this share of the largest change are not ranked;
@@ -42,7 +42,7 @@ _RIDGE = 1e-12
 """Ridge on scaled normal equations of an extrapolation; numerical."""
 
 
-def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:
+def extrapolation(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> float:
     """Largest variance of a fold's prediction from the other folds, relative to the noise variance.
 
     Notes
@@ -71,7 +71,7 @@ def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) 
     return worst
 
 
-def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
+def held_out(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> Array:
     """Held-out χ² of every fold, its unknowns fitted to the other folds.
 
     Initial states keep their own run's values, whatever is held out.
@@ -86,7 +86,7 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
 
 
-def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
+def left_out_steps(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> Array:
     """Linearised change of the unknowns when each fold is left out.
 
     Returns: (n_folds, n_unknowns).
@@ -97,7 +97,9 @@ def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds)
     return _steps(residual, columns, np.concatenate(folds.of), folds.count)
 
 
-def held_out_samples(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> list[Array]:
+def held_out_samples(
+    regression: Regression, fit: Fit, noise: BandNoise, folds: Folds
+) -> list[Array]:
     """Held-out error of every sample, one array per segment, SI."""
     inverse_sigma = noise.inverse_sigma(regression)
     white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
@@ -112,7 +114,9 @@ def held_out_samples(regression: Regression, fit: Fit, noise: Noise, folds: Fold
     return np.split(left, ends[:-1])
 
 
-def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+def held_out_rms(
+    regression: Regression, fit: Fit, noise: BandNoise, folds: Folds
+) -> dict[str, float]:
     """Held-out rms error per output, SI."""
     squares = dict.fromkeys(regression.outputs, 0.0)
     parts = held_out_samples(regression, fit, noise, folds)

@@ -22,7 +22,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
-from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
+from winchkit.diagnosis.regression.noise import BandNoise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import orthonormal
 
 _EQUAL = 0.05
@@ -31,7 +31,7 @@ _WORSE = 1 / 740
 """Probability at most that a true effect fits worse by more than the limit of Δχ²."""
 
 
-def overdispersed(regression: Regression, fit: Fit, noise: Noise) -> Noise:
+def overdispersed(regression: Regression, fit: Fit, noise: BandNoise) -> BandNoise:
     """Variance of every band where a residual may exceed the noise.
 
     ``fit``: model whose residual counts as unexplained. Returns: variances and their degrees of
@@ -61,7 +61,7 @@ def overdispersed(regression: Regression, fit: Fit, noise: Noise) -> Noise:
     )
 
 
-def excess_p_value(regression: Regression, fit: Fit, noise: Noise) -> float:
+def excess_p_value(regression: Regression, fit: Fit, noise: BandNoise) -> float:
     """P-value of a residual that does not exceed the noise (Fisher's combination over bands).
 
     Notes
@@ -80,7 +80,7 @@ def excess_p_value(regression: Regression, fit: Fit, noise: Noise) -> float:
     return float(chdtrc(2 * len(p), -2 * np.sum(np.log(p))))
 
 
-def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array, Array]:
+def _of_residual(regression: Regression, fit: Fit, noise: BandNoise) -> tuple[Array, Array]:
     """Mean square of a residual per band, and its degrees of freedom."""
     count = len(regression.bands)
     bands = regression.band_of_row
@@ -96,7 +96,7 @@ def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array,
     return own, dof
 
 
-def fits_worse(regression: Regression, rival: Fit, best: Fit, noise: Noise) -> bool:
+def fits_worse(regression: Regression, rival: Fit, best: Fit, noise: BandNoise) -> bool:
     """Whether a rival fits worse than another model by more than a true effect may.
 
     ``rival``, ``best``: fits under the same variances. ``noise``: these variances, with their

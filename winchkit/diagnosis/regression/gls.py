@@ -235,7 +235,7 @@ def _derivative(
 
 
 @dataclass(frozen=True)
-class Target:
+class RequiredChiSquare:
     """A χ² that a fit has to reach to be of use."""
 
     chi_square: float
@@ -305,7 +305,7 @@ def fit_from(
     starts: Sequence[Hypothesis],
     inverse_sigma: Array,
     problem: CoarseProblem | None = None,
-    target: Target | None = None,
+    target: RequiredChiSquare | None = None,
     *,
     aim: float | None = None,
     optimum: bool = False,
@@ -409,7 +409,7 @@ def _chi_square(residual: Array, inverse_sigma: Array) -> float:
 
 
 @dataclass(frozen=True)
-class _Step:
+class _UnknownsStep:
     """A step of the unknowns."""
 
     change: Array
@@ -429,7 +429,7 @@ class _TrustRegion:
     damping: float = _LEAST_DAMPING
     """Least damping, of nearly dependent unknowns."""
 
-    def after(self, step: _Step, decrease: float) -> _TrustRegion:
+    def after(self, step: _UnknownsStep, decrease: float) -> _TrustRegion:
         """Region after a step with a decrease of χ², which is negative where it failed."""
         if not decrease > 0.0:
             bend = step.slope - decrease
@@ -468,7 +468,7 @@ class _LocalModel:
         self._values, self._vectors = values[kept], vectors[:, kept]
         self._along = self._vectors.T @ (gradient[self._free] / self._scale)
 
-    def step(self, region: _TrustRegion) -> _Step:
+    def step(self, region: _TrustRegion) -> _UnknownsStep:
         """Step to the minimum of the local model within a region."""
         damping, along = self._damping(region), self._along
         damped = self._values + damping
@@ -477,7 +477,7 @@ class _LocalModel:
         change[self._free] = (self._vectors @ turned) / self._scale
         decrease = float(np.sum(along**2 * (damped + damping) / damped**2))
         length = float(np.sqrt(turned @ turned))
-        return _Step(change, decrease, 2 * float(along @ turned), length)
+        return _UnknownsStep(change, decrease, 2 * float(along @ turned), length)
 
     def _damping(self, region: _TrustRegion) -> float:
         """Least damping with which the step ends within the region."""

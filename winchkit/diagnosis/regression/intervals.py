@@ -32,7 +32,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof
+from winchkit.diagnosis.regression.noise import BandNoise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
@@ -164,13 +164,13 @@ class Spread:
     covariance: Array
 
 
-def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
+def whitened_jacobian(regression: Regression, fit: Fit, noise: BandNoise) -> Array:
     """Jacobian of a fit, (n_rows, n_unknowns), over the standard deviations of the noise."""
     return np.asarray(fit.jacobian * noise.inverse_sigma(regression)[:, None])
 
 
 def spread_of(
-    regression: Regression, fit: Fit, noise: Noise, blocks: Folds, term: int | None = None
+    regression: Regression, fit: Fit, noise: BandNoise, blocks: Folds, term: int | None = None
 ) -> Spread:
     """Standard deviations and 95 % intervals of every unknown.
 
@@ -216,7 +216,7 @@ def spread_of(
     )
 
 
-def _jackknife(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Array:
+def _jackknife(regression: Regression, fit: Fit, noise: BandNoise, blocks: Folds) -> Array:
     """Standard deviation of every unknown by the delete-a-block jackknife."""
     steps = left_out_steps(regression, fit, noise, blocks)
     n = blocks.count

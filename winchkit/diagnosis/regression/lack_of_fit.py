@@ -15,7 +15,7 @@ from scipy.special import fdtrc
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import (
-    Noise,
+    BandNoise,
     replicate_contrasts,
     sums_per_band,
 )
@@ -45,7 +45,7 @@ class LackOfFitTest:
 
 
 def lack_of_fit_test(
-    regression: Regression, residual: Array, jacobian: Array, noise: Noise
+    regression: Regression, residual: Array, jacobian: Array, noise: BandNoise
 ) -> LackOfFitTest:
     """F test of the mean of repeats against the pure error, in every band.
 

@@ -42,7 +42,7 @@ _ROWS_EACH = 4
 
 
 @dataclass(frozen=True)
-class Noise:
+class BandNoise:
     """Variance of the noise per band.
 
     Attributes
@@ -111,7 +111,7 @@ class ReplicateContrasts:
 
 def noise_from_repeats(
     regression: Regression, residual: Array, known: Array, own: Array | None = None
-) -> Noise:
+) -> BandNoise:
     """Noise variance from the contrasts of repeated runs (pure error).
 
     ``residual``: measured minus predicted, shape (n_rows,). ``known``: signatures that may differ
@@ -138,12 +138,12 @@ def noise_from_repeats(
         dof = whole - sums_per_band(np.sum(basis**2, axis=1), split.difference_band, count)
         power = _power(regression, left, split.difference_band, np.maximum(dof, 1.0))
     power, dof = _smooth(regression, power, np.maximum(dof, 0.1))
-    return Noise(power, dof, _rms(regression, power), from_repeats=True)
+    return BandNoise(power, dof, _rms(regression, power), from_repeats=True)
 
 
 def noise_saturated(
     regression: Regression, residual: Array, *columns: NDArray[np.floating[Any]]
-) -> Noise:
+) -> BandNoise:
     """Noise variance of the residual beside all candidate effects (saturated model).
 
     ``residual``: measured minus predicted, shape (n_rows,). ``columns``: derivatives by the
@@ -178,7 +178,7 @@ def noise_saturated(
     power = _power(regression, left, bands, dof)
     # Of a band that the candidates explain whole, the neighbours say how large its variance can be.
     dof = np.where(dof < _LEAST_DOF, np.maximum(dof, _smooth(regression, power, dof)[1]), dof)
-    return Noise(power, dof, _rms(regression, power), from_repeats=False)
+    return BandNoise(power, dof, _rms(regression, power), from_repeats=False)
 
 
 def _inner_products(

@@ -31,7 +31,7 @@ _FORCE = (Stage.CABLE_WEIGHT, Stage.PULLEY)
 _INDICATED = {
     "cable_length": (Stage.CABLE, Stage.FRAME, Stage.LENGTH_INSTRUMENT),
     "tension": (Stage.CELL,),
-    "motor_torque": (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL),
+    "motor_torque": (Stage.GEARBOX, Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL),
 }
 
 

@@ -20,7 +20,7 @@ from winchkit.tabular import Columns
 
 
 @dataclass(frozen=True)
-class Trace:
+class OutputTrace:
     """One output of one run over time, SI, (n,) each; NaN where it is not compared."""
 
     run: str
@@ -61,7 +61,7 @@ class PoseTrace:
 
 def traces_of(
     regression: TimeSeriesRegression, residual: Array, before: Array | None = None
-) -> tuple[Trace, ...]:
+) -> tuple[OutputTrace, ...]:
     """Traces of every output of every run.
 
     ``residual``: measured less predicted, (n_rows,). ``before``: the same by the profile, where
@@ -79,7 +79,7 @@ def traces_of(
         measured = np.where(there, measured, np.nan)
         time = recording.signals.time
         out.append(
-            Trace(
+            OutputTrace(
                 recording.name,
                 output,
                 OUTPUT_UNITS[output],
@@ -111,14 +111,14 @@ def pose_traces(
     )
 
 
-def trace_columns(traces: Sequence[Trace | PoseTrace]) -> Columns:
+def trace_columns(traces: Sequence[OutputTrace | PoseTrace]) -> Columns:
     """Traces below each other, for pandas and Arrow: one row per sample, or per pose and column."""
-    of_runs = [trace for trace in traces if isinstance(trace, Trace)]
+    of_runs = [trace for trace in traces if isinstance(trace, OutputTrace)]
     of_poses = [trace for trace in traces if isinstance(trace, PoseTrace)]
     return _pose_columns(of_poses) if of_poses else _run_columns(of_runs)
 
 
-def _run_columns(traces: Sequence[Trace]) -> Columns:
+def _run_columns(traces: Sequence[OutputTrace]) -> Columns:
     count = [len(trace.time) for trace in traces]
     values: dict[str, Any] = {
         "output": np.repeat([trace.output for trace in traces], count).tolist(),

@@ -16,11 +16,11 @@ from winchkit.diagnosis.regression.cross_validation import (
     signed_rank_p_value,
 )
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
+from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.effects.parametrization import Coordinates
 
-Fitted = tuple[SelectionEngine, Fit, Noise]
+Fitted = tuple[SelectionEngine, Fit, BandNoise]
 """A fit with its noise and the engine that they are of."""
 
 _LEVEL = 0.02
@@ -34,7 +34,7 @@ RELEVANT_RATIO = 0.98
 
 
 def best_accepted(
-    engine: SelectionEngine, present: Fit, noise: Noise, trials: list[Trial]
+    engine: SelectionEngine, present: Fit, noise: BandNoise, trials: list[FittedCandidate]
 ) -> Fit | None:
     """Fit of the best trial that is accepted; None where none is."""
     before = engine.criterion(present)
@@ -50,7 +50,7 @@ def is_accepted(
     engine: SelectionEngine,
     present: Fit,
     larger: Fit,
-    noise: Noise,
+    noise: BandNoise,
     largest_ratio: float = RELEVANT_RATIO,
 ) -> bool:
     """Whether a larger model predicts held-out data better.

@@ -17,10 +17,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Folds, Regression
-from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, Target, fit, fit_from
+from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, RequiredChiSquare, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.admissible import admissible, best_of_each
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
 from winchkit.diagnosis.selection.minor_orders import significant_orders
@@ -45,9 +45,9 @@ class LastValue(Generic[Kept]):
     """Value computed for a fit and a noise, kept until another fit or noise is given."""
 
     def __init__(self) -> None:
-        self._kept: tuple[Fit, Noise, Kept] | None = None
+        self._kept: tuple[Fit, BandNoise, Kept] | None = None
 
-    def of(self, fit: Fit, noise: Noise, compute: Callable[[], Kept]) -> Kept:
+    def of(self, fit: Fit, noise: BandNoise, compute: Callable[[], Kept]) -> Kept:
         """The kept value, or a new one where the fit or the noise is another object."""
         if self._kept is None or self._kept[0] is not fit or self._kept[1] is not noise:
             self._kept = fit, noise, compute()
@@ -64,7 +64,7 @@ _WHOLE_CORRECTION = 1.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class FittedCandidate:
     """A candidate fitted beside the present effects.
 
     Attributes
@@ -136,16 +136,16 @@ class SelectionEngine(ABC):
         self._last_lack_of_fit_test: LastValue[LackOfFitTest] = LastValue()
         self._last_projected: LastValue[Projected] = LastValue()
         self.on_trial: Callable[[str], None] = lambda effect: None
-        self.on_step: Callable[[Fit, Noise], bool] = lambda fitted, noise: False
+        self.on_step: Callable[[Fit, BandNoise], bool] = lambda fitted, noise: False
         self.delays_wait = False
         self._optima: dict[Hashable, Hypothesis] = {}
-        self._refits: list[tuple[Hypothesis, Noise, float, Fit]] = []
+        self._refits: list[tuple[Hypothesis, BandNoise, float, Fit]] = []
         self._refitted: dict[Hashable, Hypothesis] = {}
         self._extend_grids(initial_model)
         self.signatures = self._signatures(initial_model)
 
     @abstractmethod
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Noise estimate beside a fitted model.
 
         ``residual`` (n_rows,). ``jacobian`` (n_rows, n_unknowns). ``states``: number of initial
@@ -153,18 +153,18 @@ class SelectionEngine(ABC):
         """
 
     @abstractmethod
-    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    def held_out_errors(self, fitted: Fit, noise: BandNoise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of every output that a user reads, SI."""
 
     @abstractmethod
-    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+    def _choose_folds(self, fitted: Fit, noise: BandNoise) -> Folds:
         """Folds for leave-group-out cross-validation of a fit."""
 
     @abstractmethod
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
+    def _test_lack_of_fit(self, present: Fit, noise: BandNoise) -> LackOfFitTest:
         """F test of the residual against the noise, band by band."""
 
-    def discretization_power(self, fitted: Fit, noise: Noise) -> dict[str, float]:
+    def discretization_power(self, fitted: Fit, noise: BandNoise) -> dict[str, float]:
         """Mean square of what the discretisation error explains of each output; zero by default."""
         return dict.fromkeys(noise.rms, 0.0)
 
@@ -173,11 +173,13 @@ class SelectionEngine(ABC):
         """Coarse regression; None where there is none."""
         return None
 
-    def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
+    def coarse_problem(self, noise: BandNoise) -> CoarseProblem | None:
         """Coarse regression for first fits; None where there is none."""
         return None
 
-    def _coarse_problem(self, starts: Sequence[Hypothesis], noise: Noise) -> CoarseProblem | None:
+    def _coarse_problem(
+        self, starts: Sequence[Hypothesis], noise: BandNoise
+    ) -> CoarseProblem | None:
         """The coarse regression where a fit from these starting values takes many iterations."""
         nonlinear = any(
             term.effect.memory or term.effect.probes or Coordinates(term.effect).shapes
@@ -185,11 +187,11 @@ class SelectionEngine(ABC):
         )
         return self.coarse_problem(noise) if nonlinear or len(starts) > 1 else None
 
-    def folds(self, fitted: Fit, noise: Noise) -> Folds:
+    def folds(self, fitted: Fit, noise: BandNoise) -> Folds:
         """Folds for leave-group-out cross-validation of a fit; the last result is kept."""
         return self._last_folds.of(fitted, noise, lambda: self._choose_folds(fitted, noise))
 
-    def lack_of_fit_test(self, present: Fit, noise: Noise) -> LackOfFitTest:
+    def lack_of_fit_test(self, present: Fit, noise: BandNoise) -> LackOfFitTest:
         """Lack-of-fit test of a fit; the last result is kept."""
         return self._last_lack_of_fit_test.of(
             present, noise, lambda: self._test_lack_of_fit(present, noise)
@@ -226,7 +228,7 @@ class SelectionEngine(ABC):
         """Extend the grids of candidates by what the residual shows; False where nothing is new."""
         return False
 
-    def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
+    def further_orders(self, fitted: Fit, effect: Effect, noise: BandNoise) -> tuple[Term, ...]:
         """Further orders of a fit's last effect that its residual contains; none by default."""
         return ()
 
@@ -246,7 +248,9 @@ class SelectionEngine(ABC):
             updated = self._signatures(present)
         self.signatures = updated
 
-    def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
+    def fit_with_noise(
+        self, start: Hypothesis, noise: BandNoise | None = None
+    ) -> tuple[Fit, BandNoise]:
         """Fit a hypothesis and estimate the noise from its residual.
 
         ``noise``: first estimate; by default that of the residual at the starting values. Returns:
@@ -264,7 +268,7 @@ class SelectionEngine(ABC):
         second = fit(self.regression, first.hypothesis, inverse_sigma, tolerance=_TOLERANCE)
         return second, noise
 
-    def projected(self, present: Fit, noise: Noise) -> Projected:
+    def projected(self, present: Fit, noise: BandNoise) -> Projected:
         """Signatures with the unknowns of a fit partialled out; the last result is kept."""
 
         def compute() -> Projected:
@@ -272,11 +276,11 @@ class SelectionEngine(ABC):
 
         return self._last_projected.of(present, noise, compute)
 
-    def scores(self, present: Fit, noise: Noise) -> list[Score]:
+    def scores(self, present: Fit, noise: BandNoise) -> list[Score]:
         """Scores of all candidates that the model lacks, one per effect, best first."""
         return best_of_each(self.scores_at_all_points(present, noise))
 
-    def scores_at_all_points(self, present: Fit, noise: Noise) -> list[Score]:
+    def scores_at_all_points(self, present: Fit, noise: BandNoise) -> list[Score]:
         """Scores of all candidates at every point of their shape grids, best first."""
         ranked = score(
             self.projected(present, noise), present.residual, self.regression.n_observations
@@ -285,7 +289,7 @@ class SelectionEngine(ABC):
             ranked = [item for item in ranked if not item.candidate.effect.is_delay]
         return admissible(ranked, present.hypothesis, self.regression.n_observations)
 
-    def pairs(self, present: Fit, noise: Noise) -> list[Pair]:
+    def pairs(self, present: Fit, noise: BandNoise) -> list[Pair]:
         """Pairs of candidates with a positive net gain, best first."""
         scores = self.scores_at_all_points(present, noise)
         return screened_pairs(
@@ -317,12 +321,12 @@ class SelectionEngine(ABC):
         self,
         present: Fit,
         item: Score,
-        noise: Noise,
+        noise: BandNoise,
         *,
         all_starts: bool = False,
         target: float | None = None,
         aim: float | None = None,
-    ) -> Trial:
+    ) -> FittedCandidate:
         """Fit a candidate beside the present effects, without those that it contains.
 
         Of a series law one coefficient after another is added as long as the criterion decreases.
@@ -331,14 +335,14 @@ class SelectionEngine(ABC):
         where the χ² ``target`` is out of reach, and ends where the smaller ``aim`` is, which
         decides on a trial that reaches the target.
         """
-        goal = None if target is None else Target(target, present.chi_square)
+        goal = None if target is None else RequiredChiSquare(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
         effect, inverse_sigma = item.candidate.effect, noise.inverse_sigma(self.regression)
         hypothesis = present.hypothesis
         for index in reversed(range(self.n_initial_terms, len(hypothesis.terms))):
             if hypothesis.terms[index].effect.id in effect.contains:
                 hypothesis = hypothesis.without(index)
-        best: Trial | None = None
+        best: FittedCandidate | None = None
         for law in truncated_series(effect):
             key = _key(hypothesis, law, item)
             if not all_starts and key in self._optima:
@@ -366,13 +370,17 @@ class SelectionEngine(ABC):
                 )
             if not all_starts:
                 self._optima[key] = fitted.hypothesis
-            longer = Trial(fitted, self._criterion_of_trial(fitted, hypothesis, present, noise))
+            longer = FittedCandidate(
+                fitted, self._criterion_of_trial(fitted, hypothesis, present, noise)
+            )
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
         return self._with_further_orders(best or longer, present, noise)
 
-    def _with_further_orders(self, trial: Trial, present: Fit, noise: Noise) -> Trial:
+    def _with_further_orders(
+        self, trial: FittedCandidate, present: Fit, noise: BandNoise
+    ) -> FittedCandidate:
         """The trial with all orders of its effect as one series, where its criterion is lower."""
         hypothesis = trial.fit.hypothesis
         own = hypothesis.terms[-1]
@@ -388,7 +396,7 @@ class SelectionEngine(ABC):
             hypothesis = hypothesis.without(index)
         hypothesis = hypothesis.with_term(series, self.regression.n_runs)
         fitted = self.without_minor_orders(self.refit(hypothesis, noise), noise)
-        longer = Trial(fitted, self.criterion(fitted))
+        longer = FittedCandidate(fitted, self.criterion(fitted))
         return min(trial, longer, key=lambda one: one.criterion)
 
     def _starts(self, hypothesis: Hypothesis, item: Score) -> list[Hypothesis]:
@@ -397,7 +405,7 @@ class SelectionEngine(ABC):
         starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
         return starts + [one for start in starts for one in self._without_discretization(start)]
 
-    def without_minor_orders(self, fitted: Fit, noise: Noise) -> Fit:
+    def without_minor_orders(self, fitted: Fit, noise: BandNoise) -> Fit:
         """A fit without the orders of its series that decrease χ² by less than their penalty."""
         kept = significant_orders(self.regression, fitted, noise, self.penalty_per_parameter)
         return fitted if kept is fitted.hypothesis else self.refit(kept, noise)
@@ -418,7 +426,7 @@ class SelectionEngine(ABC):
         return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
 
     def _criterion_of_trial(
-        self, fitted: Fit, without: Hypothesis, present: Fit, noise: Noise
+        self, fitted: Fit, without: Hypothesis, present: Fit, noise: BandNoise
     ) -> float:
         """Criterion of a trial; infinite where its last effect has degenerated to another."""
         criterion = self.criterion(fitted)
@@ -431,7 +439,9 @@ class SelectionEngine(ABC):
             criterion = np.inf
         return float(criterion)
 
-    def _explained_by_initial_states(self, without: Hypothesis, fitted: Fit, noise: Noise) -> bool:
+    def _explained_by_initial_states(
+        self, without: Hypothesis, fitted: Fit, noise: BandNoise
+    ) -> bool:
         """Whether the last effect explains mainly by its initial states."""
         if not fitted.hypothesis.starts[-1]:
             return False
@@ -444,7 +454,7 @@ class SelectionEngine(ABC):
             self.penalty_per_parameter,
         )
 
-    def refit(self, hypothesis: Hypothesis, noise: Noise, aim: float = np.inf) -> Fit:
+    def refit(self, hypothesis: Hypothesis, noise: BandNoise, aim: float = np.inf) -> Fit:
         """Fit a hypothesis under a given noise; the last results are kept.
 
         It starts from the values found for the same effects before, where these fit better, and
@@ -468,6 +478,6 @@ class SelectionEngine(ABC):
         self._refits = [(hypothesis, noise, aim, fitted), *self._refits[: _KEPT_REFITS - 1]]
         return fitted
 
-    def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
+    def fixed(self, hypothesis: Hypothesis, noise: BandNoise) -> Fit:
         """A hypothesis at its values, with residual and Jacobian but without iteration."""
         return fit(self.regression, hypothesis, noise.inverse_sigma(self.regression), 0)

@@ -8,17 +8,17 @@ from itertools import combinations
 import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN
-from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
+from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.scores import Score
 
 _MARGIN = 0.1
 """Share of the term's explained χ² by which the linear prediction may miss the target."""
 
 
-class Exchange:
+class RivalPlace:
     """A place in the model that rivals of one effect may take.
 
     Attributes
@@ -37,7 +37,7 @@ class Exchange:
     in a local minimum, so that it is also started from the others' values in the present model.
     """
 
-    def __init__(self, engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> None:
+    def __init__(self, engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> None:
         self._engine, self._noise = engine, noise
         self.own = present.hypothesis.terms[index]
         self._others = present.hypothesis.without(index)
@@ -55,7 +55,7 @@ class Exchange:
         scores = self._engine.scores(held, self._noise)
         return held, least, {item.candidate.effect.id: item for item in scores}
 
-    def trial(self, rival: Score, target: float, least: float, aim: float) -> Trial:
+    def trial(self, rival: Score, target: float, least: float, aim: float) -> FittedCandidate:
         """Fit a rival in the effect's place.
 
         It is fitted again from the others' present values where its χ² is above ``target`` and
@@ -84,7 +84,7 @@ _MOST_ADDITIONS = 3
 """Additions beyond which no exchange is tried; computing cost, rule of thumb."""
 
 
-def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
+def pair_exchange(engine: SelectionEngine, present: Fit, noise: BandNoise, exchanged: int) -> Fit:
     """The present fit, or the best in which a pair replaces ``exchanged`` of its additions.
 
     ``exchanged``: number of additions to be replaced, one or two.
@@ -102,7 +102,7 @@ def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged
 
 
 def _better(
-    engine: SelectionEngine, present: Fit, noise: Noise, indices: tuple[int, ...], tried: int
+    engine: SelectionEngine, present: Fit, noise: BandNoise, indices: tuple[int, ...], tried: int
 ) -> Fit | None:
     """Fit with a pair in place of the terms at ``indices``; None without a lower criterion."""
     hypothesis = present.hypothesis

@@ -8,14 +8,14 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import harmonic_series, single_orders
 
 
 def significant_orders(
-    regression: Regression, fitted: Fit, noise: Noise, penalty_per_parameter: float
+    regression: Regression, fitted: Fit, noise: BandNoise, penalty_per_parameter: float
 ) -> Hypothesis:
     """Hypothesis without the orders of its series that decrease χ² by less than their penalty.
 

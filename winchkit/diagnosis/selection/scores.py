@@ -22,9 +22,9 @@ from scipy.special import fdtri
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof
+from winchkit.diagnosis.regression.noise import BandNoise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_information
-from winchkit.diagnosis.selection.signatures import Candidate, Signatures
+from winchkit.diagnosis.selection.signatures import EffectShape, Signatures
 
 _NOTHING = 1e-300
 """Floor of a squared length that is divided by; numerical."""
@@ -51,7 +51,7 @@ class Score:
 
     Attributes
     ----------
-    candidate : Candidate
+    candidate : EffectShape
         The effect at a point of its shape grid.
     explained_ss : float
         Decrease of χ², linearised.
@@ -66,7 +66,7 @@ class Score:
         the degrees of freedom of the noise where this one acts.
     """
 
-    candidate: Candidate
+    candidate: EffectShape
     explained_ss: float
     net_gain: float
     amplitudes: Array
@@ -90,7 +90,7 @@ class Projected:
     """
 
     def __init__(
-        self, regression: Regression, signatures: Signatures, jacobian: Array, noise: Noise
+        self, regression: Regression, signatures: Signatures, jacobian: Array, noise: BandNoise
     ) -> None:
         self.signatures = signatures
         self._jacobian = jacobian
@@ -192,7 +192,7 @@ class Projected:
             for band in own[~known]:
                 yield output, np.array([band]), float(self._dof[band])
 
-    def _root(self, candidate: Candidate, plain: Array) -> Array:
+    def _root(self, candidate: EffectShape, plain: Array) -> Array:
         """R with R Rᵀ the inverse of a candidate's inner products, as far as identifiable."""
         inner = self.inner[candidate.columns, candidate.columns]
         if np.max(plain[candidate.columns]) < _ROUNDING:

@@ -23,7 +23,7 @@ from winchkit.effects.term import Term
 
 
 @dataclass(frozen=True)
-class Candidate:
+class EffectShape:
     """An effect at one point of its shape grid.
 
     Attributes
@@ -48,7 +48,7 @@ class Candidate:
         """Number of fitted parameters, counting a scanned order as one."""
         return Coordinates(self.effect).n_parameters
 
-    def with_law(self, law: Effect) -> Candidate:
+    def with_law(self, law: Effect) -> EffectShape:
         """The same candidate with a shorter series, its columns limited accordingly."""
         fixed = {p.name for p in law.parameters if p.role == "fixed"}
         usual_steps = tuple(
@@ -73,7 +73,7 @@ class Signatures:
 
     Attributes
     ----------
-    candidates : tuple of Candidate
+    candidates : tuple of EffectShape
         Effects at their grid points.
     memory : ndarray of float32, shape (at least p, n_rows)
         Columns, one after another, with room for more. Single precision, whose rounding is far
@@ -90,7 +90,7 @@ class Signatures:
         The columns on the coarse regression, as they were when they were computed on all samples.
     """
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[EffectShape, ...]
     memory: NDArray[np.float32]
     gram: Array
     reached: Mapping[str, NDArray[np.intp]]
@@ -162,7 +162,7 @@ def signatures(
     """
     writer = _ColumnWriter(regression, present, regression.outputs)
     tried = list(points(regression, effects))
-    candidates: list[Candidate] = []
+    candidates: list[EffectShape] = []
     without_signature: list[Absent] = []
     # Columns are contiguous in memory, since each is written and read as a whole. Pages of zeros,
     # the rows of outputs that an effect does not act on, are not allocated by the system.
@@ -181,7 +181,9 @@ def signatures(
         if absent:
             without_signature.append((effect, shape, tuple(absent)))
         if own:
-            candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
+            candidates.append(
+                EffectShape(effect, shape, slice(count - len(own), count), tuple(own))
+            )
     found = Signatures(
         tuple(candidates),
         memory,
@@ -280,7 +282,9 @@ def _with_new_candidates(
                 own.append(step)
                 count += 1
         if own:
-            candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
+            candidates.append(
+                EffectShape(effect, shape, slice(count - len(own), count), tuple(own))
+            )
         absent = tuple(step for step in usual_steps if step not in own)
         left += [(effect, shape, absent)] if absent else []
     first = previous.count
@@ -297,7 +301,7 @@ def _with_new_candidates(
     return found, np.arange(first, count)
 
 
-def _terms(candidate: Candidate) -> Iterator[tuple[int, Term]]:
+def _terms(candidate: EffectShape) -> Iterator[tuple[int, Term]]:
     """Number and term of every column of a candidate."""
     base = {**candidate.effect.null, **candidate.shape}
     for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start):
@@ -305,7 +309,7 @@ def _terms(candidate: Candidate) -> Iterator[tuple[int, Term]]:
 
 
 def _reached(
-    regression: Regression, candidates: Iterable[Candidate]
+    regression: Regression, candidates: Iterable[EffectShape]
 ) -> dict[str, NDArray[np.intp]]:
     """Numbers of the columns that change each output."""
     out: dict[str, list[int]] = {output: [] for output in regression.outputs}
@@ -318,7 +322,7 @@ def _reached(
 def _write_columns(
     regression: Regression,
     present: Hypothesis,
-    candidates: Iterable[Candidate],
+    candidates: Iterable[EffectShape],
     memory: NDArray[np.float32],
 ) -> None:
     """Write the columns of candidates beside a model."""

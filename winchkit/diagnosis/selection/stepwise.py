@@ -23,9 +23,9 @@ from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinea
 from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN, best_accepted, is_accepted
-from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
+from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.scores import Score, null_maxima
 from winchkit.diagnosis.selection.starting_values import other_grid_point
@@ -65,7 +65,7 @@ class SelectionResult:
     ----------
     initial_model : Fit
         The profile's own effects, fitted.
-    initial_noise : Noise
+    initial_noise : BandNoise
         Noise variance beside the initial model.
     initial_lack_of_fit_test : LackOfFitTest
         Lack-of-fit test of the initial model.
@@ -73,7 +73,7 @@ class SelectionResult:
         Whether the initial model has a lack of fit.
     final : Fit
         The final model.
-    noise : Noise
+    noise : BandNoise
         Noise variance beside the final model.
     lack_of_fit_test : LackOfFitTest
         Lack-of-fit test of the final model.
@@ -88,11 +88,11 @@ class SelectionResult:
     """
 
     initial_model: Fit
-    initial_noise: Noise
+    initial_noise: BandNoise
     initial_lack_of_fit_test: LackOfFitTest
     lack_of_fit_at_start: bool
     final: Fit
-    noise: Noise
+    noise: BandNoise
     lack_of_fit_test: LackOfFitTest
     lack_of_fit: bool
     scores: tuple[Score, ...]
@@ -147,8 +147,8 @@ def initial_result(engine: SelectionEngine) -> SelectionResult:
 
 
 def _forward_selection(
-    engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
-) -> tuple[Fit, Noise, tuple[Fit, ...]]:
+    engine: SelectionEngine, present: Fit, noise: BandNoise, scores: list[Score], threshold: float
+) -> tuple[Fit, BandNoise, tuple[Fit, ...]]:
     """Model with all accepted effects, its noise, and the fits of the first candidates."""
     tried: tuple[Fit, ...] = ()
     initial = present
@@ -177,7 +177,7 @@ def _forward_selection(
 
 
 def _imitates_rest(
-    engine: SelectionEngine, initial: Fit, present: Fit, larger: Fit, noise: Noise
+    engine: SelectionEngine, initial: Fit, present: Fit, larger: Fit, noise: BandNoise
 ) -> bool:
     """Whether a larger model's addition imitates what the laws of the present effects leave.
 
@@ -197,7 +197,7 @@ def _imitates_rest(
     return left <= _REST * before and after > _LEFT_OF_REST * (left - after)
 
 
-def with_delays(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def with_delays(engine: SelectionEngine, present: Fit, noise: BandNoise) -> tuple[Fit, BandNoise]:
     """The model with delays where they are accepted and its effects do not imitate them."""
     engine.delays_wait = False
     while True:
@@ -210,7 +210,7 @@ def with_delays(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fi
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
 
 
-def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
+def _threshold(engine: SelectionEngine, present: Fit, noise: BandNoise) -> float:
     """Largest score that noise alone exceeds in 1 % of cases."""
     chance = null_maxima(engine.projected(present, noise), engine.regression.n_observations)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
@@ -231,23 +231,23 @@ def _has_lack_of_fit(
 def _short_list(
     engine: SelectionEngine,
     present: Fit,
-    noise: Noise,
+    noise: BandNoise,
     scores: list[Score],
     *,
     complete: bool = False,
-) -> list[Trial]:
+) -> list[FittedCandidate]:
     """Trials of the five candidates with the largest scores, in their order.
 
     Unless ``complete``, a trial is abandoned where the best one before is out of reach.
     """
-    trials: list[Trial] = []
+    trials: list[FittedCandidate] = []
     for item in [item for item in scores if item.net_gain > 0][:_SHORT_LIST]:
         best = min((trial.fit.chi_square for trial in trials), default=None)
         trials.append(engine.trial(present, item, noise, target=None if complete else best))
     return trials
 
 
-def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
+def _best_pair(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit | None:
     """Best accepted pair where the model has a lack of fit and no single candidate is accepted.
 
     A pair replaces one of the first additions, or is added in outputs on which no addition acts:
@@ -275,7 +275,7 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | Non
     return best_accepted(engine, present, noise, trials)
 
 
-def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: Noise) -> bool:
+def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: BandNoise) -> bool:
     """Whether an addition acts on an output that has a lack of fit."""
     regression = engine.regression
     rejected = np.flatnonzero(engine.lack_of_fit_test(present, noise).rejected).tolist()
@@ -285,7 +285,7 @@ def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: No
 
 
 def _accepted_pair_exchange(
-    engine: SelectionEngine, present: Fit, noise: Noise, against: Fit
+    engine: SelectionEngine, present: Fit, noise: BandNoise, against: Fit
 ) -> Fit | None:
     """A pair in place of one addition that is accepted against another fit; else None.
 
@@ -298,13 +298,13 @@ def _accepted_pair_exchange(
     return better
 
 
-def _fits(trials: list[Trial]) -> tuple[Fit, ...]:
+def _fits(trials: list[FittedCandidate]) -> tuple[Fit, ...]:
     return tuple(trial.fit for trial in trials)
 
 
 def _exchange_and_eliminate(
-    engine: SelectionEngine, present: Fit, noise: Noise
-) -> tuple[Fit, Noise]:
+    engine: SelectionEngine, present: Fit, noise: BandNoise
+) -> tuple[Fit, BandNoise]:
     """Exchange and eliminate effects until the model does not change.
 
     The first of two effects may have explained both; its best rival is found only beside the
@@ -321,7 +321,7 @@ def _exchange_and_eliminate(
     return engine.fit_with_noise(present.hypothesis, noise)
 
 
-def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit:
     """Model with every addition exchanged for its best rival, where that fits better."""
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         if index >= len(present.hypothesis.terms):
@@ -353,7 +353,9 @@ def _another(item: Score, own: Term) -> bool:
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
-def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def _without_minor_terms(
+    engine: SelectionEngine, present: Fit, noise: BandNoise
+) -> tuple[Fit, BandNoise]:
     """Model without additions that explain less than what all of them leave, with repeats.
 
     Beside so much that is missing they imitate a part of it. Both are excesses of the held-out
@@ -381,7 +383,7 @@ def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) ->
     )
 
 
-def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
+def _backward_elimination(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit:
     """Model without the additions whose removal decreases the criterion."""
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = _without(engine, present, noise, index)
@@ -390,7 +392,7 @@ def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -
     return present
 
 
-def _without(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
+def _without(engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> Fit:
     """The model without one addition, fitted as far as its criterion can be the smaller one."""
     hypothesis = present.hypothesis.without(index)
     aim = engine.criterion(present) - engine.penalty(hypothesis)

@@ -14,7 +14,7 @@ from winchkit.diagnosis.regression.discretization import without_discretization_
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
-from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.candidates import with_grid, with_grid_points
@@ -67,7 +67,7 @@ class TimeSeriesSelection(SelectionEngine):
             candidates = [_with_first_order(e) if has_orders(e) else e for e in candidates]
         super().__init__(regression, initial_model, candidates)
 
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
         if self.regression.replicates:
             offsets = jacobian[:, : self.regression.n_run_offsets]
@@ -85,17 +85,17 @@ class TimeSeriesSelection(SelectionEngine):
         """Every k-th sample of one run of each set of repeats."""
         return self._coarse
 
-    def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
+    def coarse_problem(self, noise: BandNoise) -> CoarseProblem | None:
         """Every k-th sample of one run of each set of repeats, under this noise."""
         if self._coarse is None:
             return None
         return CoarseProblem(self._coarse, self._coarse.inverse_sigma(noise))
 
-    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    def held_out_errors(self, fitted: Fit, noise: BandNoise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of every output, SI."""
         return held_out_rms(self.regression, fitted, noise, folds)
 
-    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+    def _choose_folds(self, fitted: Fit, noise: BandNoise) -> Folds:
         """Groups of programme and load, or five blocks of time where groups would extrapolate.
 
         With few groups, say two loads, an unknown may be determined by one group only: its
@@ -105,14 +105,14 @@ class TimeSeriesSelection(SelectionEngine):
         largest = extrapolation(self.regression, fitted, noise, groups)
         return self.regression.five_blocks if largest > _LARGEST_EXTRAPOLATION else groups
 
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
+    def _test_lack_of_fit(self, present: Fit, noise: BandNoise) -> LackOfFitTest:
         """F test of the residual without the part that the discretisation error explains."""
         left = without_discretization_error(
             self.regression, present, noise.inverse_sigma(self.regression)
         )
         return lack_of_fit_test(self.regression, left, present.jacobian, noise)
 
-    def discretization_power(self, fitted: Fit, noise: Noise) -> dict[str, float]:
+    def discretization_power(self, fitted: Fit, noise: BandNoise) -> dict[str, float]:
         """Decrease of each output's mean square without the discretisation error."""
         regression = self.regression
         left = without_discretization_error(regression, fitted, noise.inverse_sigma(regression))
@@ -179,7 +179,7 @@ class TimeSeriesSelection(SelectionEngine):
         self._candidates = new
         return changed
 
-    def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
+    def further_orders(self, fitted: Fit, effect: Effect, noise: BandNoise) -> tuple[Term, ...]:
         """Further orders of a fit's last effect that its residual contains."""
         if not has_orders(effect):
             return ()

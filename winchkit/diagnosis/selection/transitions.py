@@ -16,7 +16,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -34,7 +34,9 @@ _SMALLEST, _LARGEST = 1e-3, 0.1
 """Of the highest rate: below, a reversal has no samples; above, it is no friction but a drag."""
 
 
-def scanned_transitions(engine: TimeSeriesSelection, final: Fit, noise: Noise) -> dict[str, float]:
+def scanned_transitions(
+    engine: TimeSeriesSelection, final: Fit, noise: BandNoise
+) -> dict[str, float]:
     """Transitions with which the friction of a model predicts held-out data better.
 
     Returns: by the unit of the rate, rad/s or m/s; empty where no error falls by 2 % and χ² by ln
@@ -86,7 +88,7 @@ def _freed(hypothesis: Hypothesis, index: int, largest: float) -> Hypothesis:
     return hypothesis.with_term_at(index, Term(effect, term.values))
 
 
-def _is_better(engine: TimeSeriesSelection, better: Fit, present: Fit, noise: Noise) -> bool:
+def _is_better(engine: TimeSeriesSelection, better: Fit, present: Fit, noise: BandNoise) -> bool:
     """Whether χ² falls by ln n and some held-out error by 2 %, as with an effect."""
     if better.chi_square > present.chi_square - engine.penalty_per_parameter:
         return False
@@ -96,7 +98,7 @@ def _is_better(engine: TimeSeriesSelection, better: Fit, present: Fit, noise: No
     return min(now[name] / before[name] for name in now if before[name]) < RELEVANT_RATIO
 
 
-def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: Noise) -> Fit:
+def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: BandNoise) -> Fit:
     """The model with the transition of its largest friction over each rate fitted.
 
     Where it is at its lower bound the friction is sharp, and the given model is returned.
@@ -117,7 +119,7 @@ def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: Nois
     return present
 
 
-def with_rounded_reversals(engine: TimeSeriesSelection, final: Fit, noise: Noise) -> Fit:
+def with_rounded_reversals(engine: TimeSeriesSelection, final: Fit, noise: BandNoise) -> Fit:
     """The model whose friction has the transitions that predict best; the given one without any."""
     hypothesis = final.hypothesis
     for unit, size in scanned_transitions(engine, final, noise).items():

@@ -21,7 +21,7 @@ import numpy as np
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 
@@ -34,11 +34,11 @@ class Reweighted:
     """A fit with the better weights, their noise, and a note where they are equal."""
 
     fit: Fit
-    noise: Noise
+    noise: BandNoise
     notes: tuple[str, ...] = ()
 
 
-def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted:
+def reweighted(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> Reweighted:
     """The same hypothesis refitted with equal weights in outputs that these predict better.
 
     ``fitted``: fit under 1/σ weights.
@@ -53,7 +53,7 @@ def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted
     regression, folds = engine.regression, engine.folds(fitted, noise)
     was = held_out_rms(regression, fitted, noise, folds)
 
-    def evenly(outputs: Collection[str]) -> tuple[Fit, Noise, dict[str, float]]:
+    def evenly(outputs: Collection[str]) -> tuple[Fit, BandNoise, dict[str, float]]:
         even = _even(regression, noise, outputs)
         refitted = fit(regression, fitted.hypothesis, even.inverse_sigma(regression))
         now = held_out_rms(regression, refitted, even, folds)
@@ -76,7 +76,7 @@ def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted
     return Reweighted(refitted, even, (note,))
 
 
-def _even(regression: Regression, noise: Noise, outputs: Collection[str]) -> Noise:
+def _even(regression: Regression, noise: BandNoise, outputs: Collection[str]) -> BandNoise:
     """Noise with one variance per output for some outputs."""
     power = noise.power.copy()
     rows = np.bincount(regression.band_of_row, minlength=len(power))

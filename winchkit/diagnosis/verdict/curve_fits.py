@@ -19,7 +19,7 @@ _LEAST_SQUARED_LENGTH = 1e-300
 
 
 @dataclass(frozen=True)
-class Curve:
+class FittedCurve:
     """A curve over one variable and the net decrease of χ² by it."""
 
     place: str
@@ -103,7 +103,7 @@ def ranked_curves(
     outputs: Sequence[str],
     penalty_per_parameter: float,
     only: Container[tuple[str, str]] | None = None,
-) -> list[Curve]:
+) -> list[FittedCurve]:
     """Best curve of every place and variable, that of the largest net decrease of χ² first.
 
     ``penalty_per_parameter``: penalty per parameter, ln n. ``only``: None for all.
@@ -118,7 +118,7 @@ def _fitted(
     partial: PartialRegression,
     families: Iterator[CurveFamily],
     penalty_per_parameter: float,
-) -> Iterator[Curve]:
+) -> Iterator[FittedCurve]:
     for family in families:
         columns = family.columns(regression)
         grams, products = basis_products(partial, columns, len(family.knots))
@@ -128,4 +128,4 @@ def _fitted(
         ]
         gain, count, law = max(fitted, key=lambda fit: fit[0] - penalty_per_parameter * fit[1])
         net_gain = gain - penalty_per_parameter * count
-        yield Curve(family.place, family.variable, net_gain, gain, law)
+        yield FittedCurve(family.place, family.variable, net_gain, gain, law)

@@ -26,7 +26,7 @@ from winchkit.diagnosis.regression.cross_validation import (
     held_out_samples,
 )
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
@@ -117,7 +117,7 @@ def white_noise(regression: TimeSeriesRegression, residual: Array) -> dict[str, 
 
 
 @dataclass(frozen=True)
-class Measured:
+class OutputEvidence:
     """What the outputs say of a model beside their errors."""
 
     deciding: frozenset[str]
@@ -130,9 +130,9 @@ def measured(
     regression: TimeSeriesRegression,
     before: Fit,
     final: Fit,
-    noise: Noise,
+    noise: BandNoise,
     outputs: Mapping[str, OutputFit],
-) -> Measured:
+) -> OutputEvidence:
     """Outputs that decide on a model, and those that refute it.
 
     Notes
@@ -171,7 +171,7 @@ def measured(
             refuted.add(output)
         if not is_at_noise(fitted) and _is_larger(loss[loss != 0.0]):
             refuted.add(output)
-    return Measured(frozenset(deciding), frozenset(refuted))
+    return OutputEvidence(frozenset(deciding), frozenset(refuted))
 
 
 def _centred(values: Array, valid: NDArray[np.bool_]) -> Array:
@@ -188,8 +188,8 @@ def _is_larger(losses: Array) -> bool:
 
 def output_fits(
     engine: SelectionEngine,
-    initial_model: tuple[Fit, Noise],
-    final: tuple[Fit, Noise],
+    initial_model: tuple[Fit, BandNoise],
+    final: tuple[Fit, BandNoise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
     """Errors of every output before and after, in sample and held out, with its noise.
@@ -200,7 +200,7 @@ def output_fits(
     assert isinstance(regression, TimeSeriesRegression)
     noise, leakage = final[1], StopBandLeakage(regression)
 
-    def errors(model: tuple[Fit, Noise]) -> tuple[dict[str, float], ...]:
+    def errors(model: tuple[Fit, BandNoise]) -> tuple[dict[str, float], ...]:
         """Rms in sample and held out, and what leaks from above the cut-off, by output."""
         held = held_out_rms(regression, *model, folds)
         return _rms(regression, model[0]), held, leakage.residual(model[0].hypothesis)

@@ -30,9 +30,9 @@ from winchkit.diagnosis.regression.dispersion import (
     overdispersed,
 )
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.exchange import Exchange
+from winchkit.diagnosis.selection.exchange import RivalPlace
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Projected
 from winchkit.effects.effect import Effect
@@ -95,7 +95,7 @@ class EquivalenceSet:
 
 
 def equivalence_set(
-    engine: SelectionEngine, final: Fit, noise: Noise, index: int
+    engine: SelectionEngine, final: Fit, noise: BandNoise, index: int
 ) -> EquivalenceSet:
     """Equivalence set of one term of the final model.
 
@@ -111,7 +111,7 @@ def equivalence_set(
     """
     dispersed = overdispersed(engine.regression, final, noise)
     own_fit = engine.refit(final.hypothesis, dispersed)
-    exchange = Exchange(engine, own_fit, dispersed, index)
+    exchange = RivalPlace(engine, own_fit, dispersed, index)
     own, base, scores = final.hypothesis.terms[index], exchange.base, exchange.scores
     own_explained_ss = next(
         (s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0
@@ -182,7 +182,7 @@ class _Member:
     """Fit under the variances of the comparison."""
 
 
-def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: Noise) -> bool:
+def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: BandNoise) -> bool:
     """Whether held-out losses per block exceed those of the named effect, one-sided."""
     excess = held_out(engine.regression, rival, noise, engine.regression.blocks) - losses
     signs = np.random.default_rng(1).choice([-1.0, 1.0], size=(_SIGN_FLIPS, len(excess)))
@@ -205,7 +205,7 @@ def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> b
 
 
 def _beside_another(
-    engine: SelectionEngine, rival: Fit, members: Sequence[Effect], noise: Noise
+    engine: SelectionEngine, rival: Fit, members: Sequence[Effect], noise: BandNoise
 ) -> _Member | None:
     """A rival with the further effect that explains most of what it leaves; None without one.
 
@@ -248,7 +248,9 @@ def _adds_nothing(rich: _Member, simple: _Member) -> bool:
     return more > 0 and bool(chdtrc(more, gain) > _LEVEL)
 
 
-def _ordered(engine: SelectionEngine, members: Sequence[_Member], noise: Noise) -> list[_Member]:
+def _ordered(
+    engine: SelectionEngine, members: Sequence[_Member], noise: BandNoise
+) -> list[_Member]:
     """Members in the order of :class:`EquivalenceSet`."""
     best: dict[int, Fit] = {}
     for member in members:

@@ -12,7 +12,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.conditioning import value_covariance
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, estimates
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.verdict.plausibility import plausible_range
 from winchkit.effects.effect import Parameter
@@ -25,7 +25,7 @@ def fit_statistics(
     regression: Regression,
     initial: Fit,
     fit: Fit,
-    noise: Noise,
+    noise: BandNoise,
     spread: Spread,
     *,
     profile: WinchProfile | None = None,

@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -31,9 +31,9 @@ from winchkit.schema.profiles.winch import WinchProfile
 def simplified(
     engine: SelectionEngine,
     final: Fit,
-    noise: Noise,
+    noise: BandNoise,
     settled: Callable[[Fit], Fit] = lambda fitted: fitted,
-) -> tuple[Fit, Noise]:
+) -> tuple[Fit, BandNoise]:
     """The model with the simplest laws, and without steps by which nothing is gained."""
     present = _with_simpler_laws(engine, final, noise, settled)
     while (without := _without_needless(engine, present, noise)) is not None:
@@ -42,7 +42,7 @@ def simplified(
 
 
 def _with_simpler_laws(
-    engine: SelectionEngine, present: Fit, noise: Noise, settled: Callable[[Fit], Fit]
+    engine: SelectionEngine, present: Fit, noise: BandNoise, settled: Callable[[Fit], Fit]
 ) -> Fit:
     """The model with every law replaced by a simpler one with which nothing is lost."""
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
@@ -58,7 +58,7 @@ def _with_simpler_laws(
     return present
 
 
-def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: Noise) -> set[str]:
+def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> set[str]:
     """Ids of the additions whose shape is at a bound, implausible, or not determined."""
     terms = list(enumerate(fitted.hypothesis.terms))[engine.n_initial_terms :]
     return {
@@ -68,14 +68,14 @@ def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: Noise) -> set[s
     }
 
 
-def _is_degenerate(engine: SelectionEngine, fitted: Fit, noise: Noise, index: int) -> bool:
+def _is_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise, index: int) -> bool:
     spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
     term, values = estimates(engine.regression, fitted, spread)[index]
     return reduced_law(term, values, engine.profile)
 
 
 def _lost_share(
-    engine: SelectionEngine, simpler: Fit, present: Fit, noise: Noise, index: int
+    engine: SelectionEngine, simpler: Fit, present: Fit, noise: BandNoise, index: int
 ) -> float:
     """Share of the excess that a term explains, which a model with a simpler law leaves."""
     without = engine.refit(present.hypothesis.without(index), noise)
@@ -87,7 +87,7 @@ def _lost_share(
     return (left - now) / (whole - now) if whole > now else 0.0
 
 
-def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> float:
+def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> float:
     """Largest ratio of the held-out errors of a smaller model to those of the present one."""
     folds = engine.folds(present, noise)
     now = held_out_rms(engine.regression, present, noise, folds)
@@ -115,7 +115,7 @@ def _is_determined(parameter: Parameter, estimate: Estimate, profile: WinchProfi
     return estimate.std < min(size, high - size)
 
 
-def with_simpler_law(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
+def with_simpler_law(engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> Fit:
     """The model with the best of the simpler laws of a term in its place, or without it."""
     effect = present.hypothesis.terms[index].effect
     base = engine.refit(present.hypothesis.without(index), noise)
@@ -125,7 +125,7 @@ def with_simpler_law(engine: SelectionEngine, present: Fit, noise: Noise, index:
     return min(fits, key=engine.criterion, default=base)
 
 
-def _without_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
+def _without_needless(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit | None:
     """The model without the step whose removal raises the held-out errors least, by 2 % at most.
 
     None where every step is needed.
@@ -140,7 +140,7 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fi
 
 
 def with_first_members(
-    engine: SelectionEngine, final: Fit, noise: Noise, sets: Sequence[EquivalenceSet]
+    engine: SelectionEngine, final: Fit, noise: BandNoise, sets: Sequence[EquivalenceSet]
 ) -> tuple[Fit, list[EquivalenceSet]]:
     """The model of the first members of all sets, refitted together, and the sets beside it.
 

@@ -22,10 +22,10 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import AT_NOISE, excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
+from winchkit.diagnosis.verdict.curve_fits import FittedCurve, PartialRegression, ranked_curves
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
 
 MARGIN = 0.1
@@ -35,8 +35,8 @@ _TRIED = 3
 
 
 def better_curve(
-    engine: TimeSeriesSelection, final: Fit, noise: Noise, index: int
-) -> tuple[Curve, float] | None:
+    engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
+) -> tuple[FittedCurve, float] | None:
     """A curve that explains more than the term at ``index``, and by which share of its excess.
 
     None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
@@ -74,7 +74,7 @@ def _is_above(errors: Mapping[str, float], noise: Mapping[str, float | None]) ->
 
 
 def predictable_share(
-    engine: TimeSeriesSelection, final: Fit, noise: Noise, size: Mapping[str, float | None]
+    engine: TimeSeriesSelection, final: Fit, noise: BandNoise, size: Mapping[str, float | None]
 ) -> float:
     """Largest share of what a model leaves that a free curve predicts on held-out data."""
     regression, folds = engine.regression, engine.folds(final, noise)
@@ -98,12 +98,12 @@ def predictable_share(
 def _screened(
     engine: TimeSeriesSelection,
     final: Fit,
-    noise: Noise,
+    noise: BandNoise,
     *,
     index: int,
     outputs: Sequence[str],
     margin: float,
-) -> list[Curve]:
+) -> list[FittedCurve]:
     """Curves whose gain exceeds that of a term by the margin in sample, the largest first.
 
     On the coarse regression first, where there is one: it has all frequencies of a slow curve.
@@ -139,7 +139,7 @@ def _above(
     outputs: Sequence[str],
     penalty: float,
     margin: float,
-) -> list[Curve]:
+) -> list[FittedCurve]:
     without = _without(regression, final, index)
     partial = PartialRegression(without.residual, without.jacobian, weights)
     own = PartialRegression(final.residual, final.jacobian, weights)
@@ -151,7 +151,7 @@ def _above(
 def _errors(
     regression: TimeSeriesRegression,
     model: Fit,
-    noise: Noise,
+    noise: BandNoise,
     folds: Folds,
     outputs: Container[str],
 ) -> dict[str, float]:
@@ -175,7 +175,7 @@ def _without(regression: TimeSeriesRegression, final: Fit, index: int) -> Fit:
     )
 
 
-def _with_curve(regression: TimeSeriesRegression, model: Fit, curve: Curve) -> Fit:
+def _with_curve(regression: TimeSeriesRegression, model: Fit, curve: FittedCurve) -> Fit:
     """A fit with the columns of a curve as further unknowns, before its initial states."""
     place = curve.place, curve.variable
     (family,) = curves(regression, list(PLACES[curve.place]), {place})

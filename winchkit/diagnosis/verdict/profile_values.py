@@ -9,7 +9,7 @@ from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Doubt, OutputFit, Place, Step
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -18,7 +18,7 @@ from winchkit.diagnosis.steps import standing_of
 from winchkit.effects.term import Term
 
 
-def file_model(engine: SelectionEngine, start: Hypothesis, noise: Noise) -> Fit:
+def file_model(engine: SelectionEngine, start: Hypothesis, noise: BandNoise) -> Fit:
     """The profile's effects at their file values; offsets and initial states are fitted."""
     of_file = Hypothesis(tuple(map(held, start.terms)), start.nuisances, start.starts)
     return fit(engine.regression, of_file, noise.inverse_sigma(engine.regression))

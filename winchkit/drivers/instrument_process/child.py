@@ -24,7 +24,7 @@ from winchkit.drivers.instrument_process.messages import (
     COUNTS,
     InstrumentState,
     Kind,
-    Messages,
+    MessageCutter,
     RawReading,
     json_message,
     message,
@@ -33,7 +33,7 @@ from winchkit.drivers.instrument_process.messages import (
 from winchkit.drivers.instrument_process.process import Line, line_of
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.publisher import Publisher, Sampled
-from winchkit.drivers.reading import Quality, Reading, Sensor
+from winchkit.drivers.reading import InstrumentReading, Quality, Sensor
 from winchkit.drivers.slow import SlowDevices
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.errors import ConnectionLost, WinchkitError, class_name
@@ -91,7 +91,7 @@ class _Forwarding(Publisher):
 
     def publish(
         self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
-    ) -> Reading:
+    ) -> InstrumentReading:
         """Send it, and keep a reading for the line's own use."""
         self._forward(value, gross, counts, quality, when)
         return super().publish(value, gross, counts, quality, when)
@@ -204,7 +204,7 @@ def _serve(requests: Iterator[bytes], outbox: _Outbox) -> None:
 
 def _requests(descriptor: int) -> Iterator[bytes]:
     """Contents of the messages from the bench, until it closes the pipe."""
-    messages = Messages()
+    messages = MessageCutter()
     while data := os.read(descriptor, _CHUNK):
         for _, content in messages.feed(data):
             yield content

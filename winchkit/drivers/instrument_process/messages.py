@@ -96,7 +96,7 @@ def raw_reading_of(content: bytes) -> RawReading:
     return RawReading(instrument, value, gross, counts, Quality(flags), Sampled(*times))
 
 
-class Messages:
+class MessageCutter:
     """Cuts what arrives into messages."""
 
     def __init__(self) -> None:

@@ -24,7 +24,7 @@ from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.instrument_process.messages import (
     InstrumentState,
     Kind,
-    Messages,
+    MessageCutter,
     json_message,
     message,
     raw_reading_of,
@@ -42,7 +42,7 @@ Line = ModbusLine | StreamLine
 
 
 @dataclass(frozen=True)
-class InstrumentSpec:
+class LineInstrument:
     """An instrument on a line."""
 
     label: str
@@ -55,16 +55,16 @@ class InstrumentSpec:
 
 
 @dataclass(frozen=True)
-class LineSpec:
+class ProcessLineSpec:
     """A Modbus or serial line and its instruments."""
 
     bus: str
     """Name of the bus."""
     spec: BusSpec
-    instruments: tuple[InstrumentSpec, ...]
+    instruments: tuple[LineInstrument, ...]
 
 
-def line_of(line: LineSpec, clock: Clock) -> Line:
+def line_of(line: ProcessLineSpec, clock: Clock) -> Line:
     """Make a line, not opened yet; its instruments have the order of the declaration.
 
     Raises FileError where a device file contradicts itself, or a device that sends by itself is
@@ -105,7 +105,7 @@ class InstrumentProcess:
     def __init__(self, clock: MonotonicClock) -> None:
         """Take lines by :meth:`adopt`, then :meth:`start`."""
         self._clock = clock
-        self._specs: list[LineSpec] = []
+        self._specs: list[ProcessLineSpec] = []
         self._instruments: list[SeparateInstrument] = []
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
@@ -123,7 +123,7 @@ class InstrumentProcess:
         """Number of the process; None before its start, or where there is no line to serve."""
         return None if self._process is None else self._process.pid
 
-    def adopt(self, spec: LineSpec, line: Line) -> SeparateLine:
+    def adopt(self, spec: ProcessLineSpec, line: Line) -> SeparateLine:
         """Serve a line that was made here from ``spec``, and is not served here.
 
         Returns the line with the instruments as the bench sees them; they take over names,
@@ -235,7 +235,7 @@ class InstrumentProcess:
 
     def _receive(self) -> None:
         """Take what the process sends until it ends."""
-        process, messages = self._process, Messages()
+        process, messages = self._process, MessageCutter()
         assert process is not None, "it was started"
         assert process.stdout is not None, "it is a pipe"
         name = self._name

@@ -22,7 +22,7 @@ from pymodbus.pdu import ExceptionResponse
 
 from winchkit.drivers.modbus import transactions
 from winchkit.drivers.modbus.deviations import Deviations
-from winchkit.drivers.modbus.frames import AnswerGate, Event
+from winchkit.drivers.modbus.frames import AnswerGate, LineEvent
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.unplugged import UNPLUGGED
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
@@ -77,7 +77,7 @@ class ModbusClient:
         """Whether the connection was closed here because something else than the answer came."""
         self.refusal = 0
         """Exception code of the newest refusal."""
-        self._events: defaultdict[int, deque[Event]] = defaultdict(lambda: deque(maxlen=_KEPT))
+        self._events: defaultdict[int, deque[LineEvent]] = defaultdict(lambda: deque(maxlen=_KEPT))
 
     @property
     def where(self) -> str:
@@ -127,7 +127,7 @@ class ModbusClient:
             except _PORT_ERRORS as error:
                 logging.getLogger(__name__).debug("%s: closing: %s", self.where, error)
 
-    def events(self, unit: int) -> list[Event]:
+    def events(self, unit: int) -> list[LineEvent]:
         """Events of a unit, other than good answers, since the last call."""
         self._collect()
         return list(self._events.pop(unit, ()))

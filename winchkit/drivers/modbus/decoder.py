@@ -58,7 +58,7 @@ _NEAR_ZERO = 1.0
 """Counts; where the status says that the gross value is within a quarter of a count of zero."""
 
 
-class Decoded(NamedTuple):
+class RegisterContent(NamedTuple):
     """Content of one block of registers."""
 
     value: float
@@ -68,7 +68,7 @@ class Decoded(NamedTuple):
     status: int
 
 
-class Decoder:
+class RegisterDecoder:
     """Decoder of the registers of one type of device."""
 
     def __init__(self, device: DeviceSpec) -> None:
@@ -85,7 +85,9 @@ class Decoder:
         self.dimension = dimension_of(self.field.unit) or ""
         self.status = StatusWord(self.spec.status)
 
-    def decode(self, registers: Sequence[int], status_registers: Sequence[int] = ()) -> Decoded:
+    def decode(
+        self, registers: Sequence[int], status_registers: Sequence[int] = ()
+    ) -> RegisterContent:
         """Value and gross value (SI or NaN), signed counts, quality, status word.
 
         ``registers`` are those of the block ``read``, ``status_registers`` those of
@@ -99,8 +101,8 @@ class Decoder:
         gross = self._counts(self._gross, words, status)
         quality = self.status.quality(status) | self._plausibility(counts, gross, status)
         if not quality.usable:
-            return Decoded(math.nan, math.nan, counts, quality, status)
-        return Decoded(
+            return RegisterContent(math.nan, math.nan, counts, quality, status)
+        return RegisterContent(
             self._si(self.field, counts, words),
             self._si(self._gross, gross, words),
             counts,

@@ -24,7 +24,7 @@ _TAIL = {"rtu": 2, "tcp": 0}
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class LineEvent:
     """Something on the line that was not the answer asked for."""
 
     unit: int
@@ -60,7 +60,7 @@ class AnswerGate:
         self._buffer = b""
         self._echoes = False
         self._last: dict[int, Request] = {}
-        self._events: list[Event] = []
+        self._events: list[LineEvent] = []
 
     def sent(self, packet: bytes) -> None:
         """A request is sent; earlier bytes are no answer to it."""
@@ -94,7 +94,7 @@ class AnswerGate:
             self._last[waiting.unit] = waiting
         return bool(left)
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[LineEvent]:
         """Events since the last call."""
         if self._request is None:
             self.expire()
@@ -152,7 +152,7 @@ class AnswerGate:
         return "late" if same else "malformed"
 
     def _note(self, unit: int, kind: Kind, count: int = 1, registers: int = 0) -> None:
-        self._events.append(Event(unit, kind, count, registers))
+        self._events.append(LineEvent(unit, kind, count, registers))
 
 
 def crc16(data: bytes) -> bytes:

@@ -9,7 +9,7 @@ from math import inf, nan
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.consistency import Consistency
-from winchkit.drivers.modbus.decoder import Decoded, Decoder
+from winchkit.drivers.modbus.decoder import RegisterContent, RegisterDecoder
 from winchkit.drivers.modbus.late_replies import LISTENING, LateReplies
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality
@@ -49,7 +49,7 @@ class Instrument(InstrumentReadings):
         """
         self.name = name
         self.unit = unit
-        self.decoder = Decoder(device)
+        self.decoder = RegisterDecoder(device)
         self.device = device
         self.wanted_rate = min(rate, self.decoder.spec.rate)
         self.problem: ConnectionLost | None = None
@@ -261,7 +261,7 @@ class Instrument(InstrumentReadings):
             quality |= Quality.MISMATCH
         self.publisher.publish(decoded.value, decoded.gross, decoded.counts, quality, sampled)
 
-    def _before(self, registers: Sequence[int], decoded: Decoded) -> Quality:
+    def _before(self, registers: Sequence[int], decoded: RegisterContent) -> Quality:
         """Flags of the status that was read before the value."""
         if self._status_before is None or self.decoder.spec.status_read is None:
             return Quality.GOOD

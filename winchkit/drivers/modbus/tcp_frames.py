@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import deque
 
 from winchkit.drivers.modbus.deviations import Deviations
-from winchkit.drivers.modbus.frames import Event, Kind, Request, request_of
+from winchkit.drivers.modbus.frames import Kind, LineEvent, Request, request_of
 from winchkit.drivers.modbus.transactions import Transactions
 
 _HEAD = 6
@@ -59,7 +59,7 @@ class TcpAnswerGate:
         self._buffer = b""
         self._joints: list[int] = []
         """Where in the buffer a piece began that came later than the one before."""
-        self._events: list[Event] = []
+        self._events: list[LineEvent] = []
 
     def sent(self, packet: bytes) -> None:
         """A request goes out."""
@@ -97,7 +97,7 @@ class TcpAnswerGate:
         self.broken |= waiting is not None
         return came
 
-    def events(self) -> list[Event]:
+    def events(self) -> list[LineEvent]:
         """Events since the last call."""
         events, self._events = self._events, []
         return events
@@ -164,7 +164,7 @@ class TcpAnswerGate:
             # A whole frame of another transaction: the next one begins where it ends.
             self.broken = True
             kind: Kind = "late" if frame[:2] in self.transactions else "malformed"
-            self._events.append(Event(frame[_HEAD], kind))
+            self._events.append(LineEvent(frame[_HEAD], kind))
             return False
         body, refusal = frame[_HEAD:], request.refusal
         refused = body.startswith(refusal) and len(body) == len(refusal) + 1
@@ -197,4 +197,4 @@ class TcpAnswerGate:
         """Where the next frame begins is not known any more."""
         self.broken = self.lost = True
         self._buffer, self._joints = b"", []
-        self._events.append(Event(self._unit, "malformed"))
+        self._events.append(LineEvent(self._unit, "malformed"))

@@ -21,7 +21,7 @@ _TURNAROUND = {"modbus-rtu": 2e-3, "modbus-tcp": 0.3e-3}
 
 
 @dataclass(frozen=True)
-class Exchange:
+class ReadingTiming:
     """Where the time of one reading goes, s."""
 
     bytes: int
@@ -36,7 +36,7 @@ class Exchange:
         return self.wire + self.silence + self.turnaround
 
 
-def exchange(spec: ModbusSpec, bus: BusSpec) -> Exchange:
+def exchange(spec: ModbusSpec, bus: BusSpec) -> ReadingTiming:
     """The time that one reading of a device takes on a line, as the standard has it."""
     blocks = [block for block in (spec.read, spec.status_read) if block is not None]
     size = sum(_bytes(block) for block in blocks)
@@ -46,7 +46,7 @@ def exchange(spec: ModbusSpec, bus: BusSpec) -> Exchange:
         wire = size * _bits(bus) / bus.baudrate
         if any(block.fixed for block in blocks):
             silence += len(blocks) * LISTENING
-    return Exchange(
+    return ReadingTiming(
         size,
         wire,
         max(silence, len(blocks) * spec.gap),

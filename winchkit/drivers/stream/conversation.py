@@ -12,9 +12,9 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Counters
 from winchkit.drivers.device_command import declared_command
 from winchkit.drivers.reading import Quality
-from winchkit.drivers.stream.decoder import Meaning, ParsedFrame
+from winchkit.drivers.stream.decoder import FrameType, ParsedFrame
 from winchkit.drivers.stream.instrument import StreamInstrument
-from winchkit.drivers.stream.parser import Item, StreamParser
+from winchkit.drivers.stream.parser import StreamFrame, StreamParser
 from winchkit.drivers.stream.port import Chunk, Port
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
@@ -92,7 +92,7 @@ class Conversation:
         if chunk is None:
             return False
         found = instrument.parser.feed(chunk.data)
-        readings = [item for item in found if item.frame.meaning is Meaning.READING]
+        readings = [item for item in found if item.frame.meaning is FrameType.READING]
         instrument.sent(readings, chunk.time, self)
         return bool(readings)
 
@@ -106,7 +106,7 @@ class Conversation:
             return
         t_request = self._clock.now()
         item, time = await self._ask(instrument, spec.poll, instrument.parser)
-        if item.frame.meaning is not Meaning.READING:
+        if item.frame.meaning is not FrameType.READING:
             raise self._refusal(instrument, item.frame)
         instrument.answered(item, t_request, time, self)
 
@@ -186,17 +186,17 @@ class Conversation:
                 raise self.silent(instrument)
             found = parser.feed(chunk.data)
             if by_itself:
-                readings = [item for item in found if item.frame.meaning is Meaning.READING]
+                readings = [item for item in found if item.frame.meaning is FrameType.READING]
                 instrument.sent(readings, chunk.time, self)
             for item in found:
-                if item.frame.meaning is Meaning.ANSWER:
+                if item.frame.meaning is FrameType.ANSWER:
                     return
-                if item.frame.meaning in (Meaning.BUSY, Meaning.REFUSED):
+                if item.frame.meaning in (FrameType.BUSY, FrameType.REFUSED):
                     raise self._refusal(instrument, item.frame)
 
     async def _ask(
         self, instrument: StreamInstrument, send: str, parser: StreamParser
-    ) -> tuple[Item, float]:
+    ) -> tuple[StreamFrame, float]:
         """Send a request and wait for one frame and the moment at which it came."""
         await self.idle(self._clock.now(), instrument)
         parser.begin()
@@ -223,7 +223,7 @@ class Conversation:
 
     def _refusal(self, instrument: StreamInstrument, frame: ParsedFrame) -> DeviceRefused:
         said = frame.text.strip()
-        why = "is busy" if frame.meaning is Meaning.BUSY else "refuses"
+        why = "is busy" if frame.meaning is FrameType.BUSY else "refuses"
         return DeviceRefused(f"{self._where}: {instrument.name} {why}: it answers '{said}'")
 
 

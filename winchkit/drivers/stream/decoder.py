@@ -33,7 +33,7 @@ _FLAGS: dict[Says, Quality] = {
 }
 
 
-class Meaning(Enum):
+class FrameType(Enum):
     """Type of a frame."""
 
     READING = auto()
@@ -47,7 +47,7 @@ class Meaning(Enum):
     BAD_CHECKSUM = auto()
 
 
-class Decoded(NamedTuple):
+class StreamContent(NamedTuple):
     """Content of a frame."""
 
     value: float
@@ -61,9 +61,9 @@ class Decoded(NamedTuple):
 class ParsedFrame(NamedTuple):
     """A frame with its type; ``before`` are the bytes of garbage in front of it."""
 
-    meaning: Meaning
+    meaning: FrameType
     text: str
-    decoded: Decoded | None = None
+    decoded: StreamContent | None = None
     before: int = 0
 
 
@@ -75,10 +75,10 @@ class _Status(NamedTuple):
     unit: str
 
 
-NOTHING = Decoded(math.nan, math.nan, math.nan, Quality.GOOD)
+NOTHING = StreamContent(math.nan, math.nan, math.nan, Quality.GOOD)
 
 
-class Decoder:
+class StreamDecoder:
     """Decoder of the frames of one type of device."""
 
     def __init__(
@@ -104,7 +104,7 @@ class Decoder:
         first, size = layout.value
         counts = float(int.from_bytes(data[first : first + size], layout.order, signed=True))
         said: list[Says] = [] if layout.bits is None else self._in_bits(data[layout.bits])
-        return ParsedFrame(Meaning.READING, data.hex(), self._measured(said, counts, counts, ""))
+        return ParsedFrame(FrameType.READING, data.hex(), self._measured(said, counts, counts, ""))
 
     def line(self, data: bytes) -> ParsedFrame:
         """A line of text."""
@@ -114,27 +114,27 @@ class Decoder:
         if reply is not None:
             return self._reply(bare, self._spec.replies[reply])
         if fits(bare, self._answers) is not None:
-            return ParsedFrame(Meaning.ANSWER, bare)
-        spoilt = Meaning.MALFORMED
+            return ParsedFrame(FrameType.ANSWER, bare)
+        spoilt = FrameType.MALFORMED
         for matcher in self._matchers:
             match = matcher.match(text)
             if match is None:
                 continue
             if not self._is_whole(match):
-                spoilt = Meaning.BAD_CHECKSUM
+                spoilt = FrameType.BAD_CHECKSUM
                 continue
             decoded = self._fields(match.fields)
             if decoded is not None:
-                kind = Meaning.READING if "value" in match.fields else Meaning.STATUS
+                kind = FrameType.READING if "value" in match.fields else FrameType.STATUS
                 return ParsedFrame(kind, match.text, decoded, match.before)
         return ParsedFrame(spoilt, text)
 
     def _reply(self, text: str, says: Says) -> ParsedFrame:
         if says == "busy":
-            return ParsedFrame(Meaning.BUSY, text)
+            return ParsedFrame(FrameType.BUSY, text)
         if says == "refused":
-            return ParsedFrame(Meaning.REFUSED, text)
-        return ParsedFrame(Meaning.READING, text, NOTHING._replace(quality=self._quality([says])))
+            return ParsedFrame(FrameType.REFUSED, text)
+        return ParsedFrame(FrameType.READING, text, NOTHING._replace(quality=self._quality([says])))
 
     def _is_whole(self, match: Match) -> bool:
         spec = self._spec.checksum
@@ -143,7 +143,7 @@ class Decoder:
         said = match.fields["checksum"].upper()
         return said == f"{check_sum(spec, match.text, len(match.fields['checksum'])):02X}"
 
-    def _fields(self, fields: dict[str, str]) -> Decoded | None:
+    def _fields(self, fields: dict[str, str]) -> StreamContent | None:
         """Values of the fields, None where one of them is unknown."""
         address = fields.get("address")
         if address is not None and not self._is_mine(address):
@@ -184,7 +184,7 @@ class Decoder:
                 return None
         return found
 
-    def _numbers(self, fields: dict[str, str], status: _Status) -> Decoded | None:
+    def _numbers(self, fields: dict[str, str], status: _Status) -> StreamContent | None:
         said, factor, unit = status
         words = [self._word(fields[name], fields) for name in NUMBERS if name in fields]
         said += [word for word in words if word is not None]
@@ -221,15 +221,15 @@ class Decoder:
             said.append("gross")
         return said
 
-    def _measured(self, said: list[Says], counts: float, gross: float, unit: str) -> Decoded:
+    def _measured(self, said: list[Says], counts: float, gross: float, unit: str) -> StreamContent:
         quality = self._quality(said)
         capacity = self._spec.capacity
         if capacity is not None and abs(counts) > capacity:
             quality |= Quality.OVERLOAD
         net = "net" in said if "net" in said or "gross" in said else None
         if not quality.usable:
-            return Decoded(math.nan, math.nan, counts, quality, net)
-        return Decoded(self._si(counts, unit), self._si(gross, unit), counts, quality, net)
+            return StreamContent(math.nan, math.nan, counts, quality, net)
+        return StreamContent(self._si(counts, unit), self._si(gross, unit), counts, quality, net)
 
     def _si(self, number: float, unit: str) -> float:
         one = self._spec.units.get(unit, self._spec)

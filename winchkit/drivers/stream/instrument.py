@@ -10,9 +10,9 @@ from winchkit.drivers.counters import Tally
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import REPLY_HORIZON, Quality
 from winchkit.drivers.sharing import LATE, QUICK_RETRIES, RETRY, STALE_TIMEOUTS
-from winchkit.drivers.stream.decoder import Decoded
+from winchkit.drivers.stream.decoder import StreamContent
 from winchkit.drivers.stream.parser import (
-    Item,
+    StreamFrame,
     StreamParser,
     asking_whether_fresh,
     stream_of,
@@ -25,7 +25,7 @@ _JITTER = 0.8
 """Two frames come at least this share of a conversion apart."""
 
 
-class Wire(Protocol):
+class LineTiming(Protocol):
     """Times of a line, s."""
 
     @property
@@ -106,11 +106,13 @@ class StreamInstrument(InstrumentReadings):
         """Bytes to send, with the address."""
         return template.format(address=_Address(self.address or 0)).encode("latin-1")
 
-    def took(self, decoded: Decoded) -> None:
+    def took(self, decoded: StreamContent) -> None:
         """Keep the status that a device gives beside its next value."""
         self._flags = decoded.quality
 
-    def answered(self, item: Item, t_request: float, t_chunk: float, wire: Wire) -> None:
+    def answered(
+        self, item: StreamFrame, t_request: float, t_chunk: float, wire: LineTiming
+    ) -> None:
         """Publish the answer to a request: the last conversion before it was sent."""
         t_receive = max(t_request, t_chunk - item.behind * wire.byte_time)
         earliest = t_request - 1.0 / self.spec.rate
@@ -123,7 +125,7 @@ class StreamInstrument(InstrumentReadings):
             return
         self._publish(item, when, late)
 
-    def sent(self, items: list[Item], t_chunk: float, wire: Wire) -> None:
+    def sent(self, items: list[StreamFrame], t_chunk: float, wire: LineTiming) -> None:
         """Publish the frames of one chunk that the device sent by itself.
 
         Several at once mean that host or adapter held them back: all that is known then is that
@@ -148,7 +150,7 @@ class StreamInstrument(InstrumentReadings):
         delay = self.spec.filter_delay
         return Sampled(t_request, t_receive, earliest - delay, latest - delay)
 
-    def _publish(self, item: Item, when: Sampled, late: Quality) -> None:
+    def _publish(self, item: StreamFrame, when: Sampled, late: Quality) -> None:
         decoded = item.frame.decoded
         assert decoded is not None, "a frame that is a reading says something"
         quality = decoded.quality | self._flags | late

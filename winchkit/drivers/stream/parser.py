@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from winchkit.drivers.stream.decoder import Decoder, Meaning, ParsedFrame
+from winchkit.drivers.stream.decoder import FrameType, ParsedFrame, StreamDecoder
 from winchkit.drivers.stream.framing import framing_of
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
@@ -28,7 +28,7 @@ class ParserCounts:
     """Frames that said why there is no value."""
 
 
-class Item(NamedTuple):
+class StreamFrame(NamedTuple):
     """A frame with content."""
 
     frame: ParsedFrame
@@ -45,7 +45,7 @@ class StreamParser:
         """Raise FileError where the device file contradicts itself."""
         self.spec = spec = stream_of(device)
         self.counts = ParserCounts()
-        self.decoder = Decoder(spec, device.path, address=address, frames=spec.frame)
+        self.decoder = StreamDecoder(spec, device.path, address=address, frames=spec.frame)
         self._framing = framing_of(spec)
         self._before = 0
 
@@ -62,28 +62,28 @@ class StreamParser:
         self._framing.begin(sure=sure)
         self._count_skipped()
 
-    def feed(self, data: bytes) -> list[Item]:
+    def feed(self, data: bytes) -> list[StreamFrame]:
         """Frames that are whole now and say something, in order."""
         found = []
         for piece in self._framing.feed(data):
             if piece.broken:
-                frame = ParsedFrame(Meaning.MALFORMED, piece.data.hex())
+                frame = ParsedFrame(FrameType.MALFORMED, piece.data.hex())
             elif self.spec.binary is not None:
                 frame = self.decoder.binary(piece.data)
             else:
                 frame = self.decoder.line(piece.data)
             if self._count(frame, piece.size):
-                found.append(Item(frame, piece.behind, piece.size - frame.before))
+                found.append(StreamFrame(frame, piece.behind, piece.size - frame.before))
         self._count_skipped()
         return found
 
     def _count(self, frame: ParsedFrame, size: int) -> bool:
         """Whether the frame says something."""
         counts = self.counts
-        if frame.meaning in (Meaning.MALFORMED, Meaning.BAD_CHECKSUM):
+        if frame.meaning in (FrameType.MALFORMED, FrameType.BAD_CHECKSUM):
             counts.spoilt += size
-            counts.malformed += frame.meaning is Meaning.MALFORMED
-            counts.bad_checksums += frame.meaning is Meaning.BAD_CHECKSUM
+            counts.malformed += frame.meaning is FrameType.MALFORMED
+            counts.bad_checksums += frame.meaning is FrameType.BAD_CHECKSUM
             return False
         self._before += frame.before
         counts.framed += size - frame.before

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.output import echo_json
@@ -16,7 +16,7 @@ from winchkit.cli.model.options import json_option
 
 @click.command(
     "diagnose",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
         Example(

@@ -88,7 +88,7 @@ def tell_comparisons(
     from winchkit.fleet.diagnosis.anova import errors_of, shared_errors
     from winchkit.fleet.report.comparison import shared_errors_text
     from winchkit.report.pages.pages import comparison_figures, comparison_html
-    from winchkit.report.reproducibility import Command
+    from winchkit.report.reproducibility import CommandLine
     from winchkit.report.text import compare_text
 
     found, errors = {}, {}
@@ -105,7 +105,7 @@ def tell_comparisons(
                 page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
                 save_page(str(Path(html).with_name(pages[name])), page)
             if figures:
-                source = Command(answer.regression.dataset, asked.profile).source
+                source = CommandLine(answer.regression.dataset, asked.profile).source
                 save_figures(figures, comparison_figures(answer, source), name)
             del answer  # gigabytes after long runs
     shared = shared_errors(errors)

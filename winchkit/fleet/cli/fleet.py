@@ -5,11 +5,11 @@ from __future__ import annotations
 import click
 
 from winchkit.cli.core.command import Example
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 
 COMMANDS = {
-    "diagnose": At("winchkit.fleet.cli.diagnose", "Diagnose every winch and session."),
-    "trend": At("winchkit.fleet.cli.trend", "What changed, since when, at what cost."),
+    "diagnose": CommandPlace("winchkit.fleet.cli.diagnose", "Diagnose every winch and session."),
+    "trend": CommandPlace("winchkit.fleet.cli.trend", "What changed, since when, at what cost."),
 }
 
 

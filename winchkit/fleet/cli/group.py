@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 
 COMMANDS = {
-    "index": At("winchkit.fleet.cli.index", "Bring the tables to the state of the files."),
-    "list": At("winchkit.fleet.cli.list", "List runs by winch, programme, load, date, verdict."),
-    "query": At("winchkit.fleet.cli.query", "Answer a SELECT over the tables (DuckDB)."),
+    "index": CommandPlace(
+        "winchkit.fleet.cli.index", "Bring the tables to the state of the files."
+    ),
+    "list": CommandPlace(
+        "winchkit.fleet.cli.list", "List runs by winch, programme, load, date, verdict."
+    ),
+    "query": CommandPlace("winchkit.fleet.cli.query", "Answer a SELECT over the tables (DuckDB)."),
 }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE
 from winchkit.cli.core.output import echo_json
@@ -14,7 +14,7 @@ from winchkit.cli.model.options import json_option
 
 @click.command(
     "index",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit library index .",
         "winchkit library index . -p bench-spiral --json",

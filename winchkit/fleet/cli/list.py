@@ -6,15 +6,15 @@ from datetime import date, datetime
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.model.options import json_option
 
 
 @click.command(
     "list",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit library list . --winch A --since 2026-03-01",
         "winchkit library list . --load '10 kg' --json",
@@ -26,7 +26,7 @@ from winchkit.cli.model.options import json_option
 @click.option(
     "--load",
     metavar="MASS",
-    type=Quantity("mass", example="10 kg"),
+    type=QuantityType("mass", example="10 kg"),
     help="Known mass on the cable, such as '10 kg'.",
 )
 @click.option("--since", metavar="DATE", help="First UTC day, YYYY-MM-DD.")

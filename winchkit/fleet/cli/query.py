@@ -7,14 +7,14 @@ import sys
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import json_option
 
 
 @click.command(
     "query",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         'winchkit library query . "SELECT winch, count(*) AS runs FROM runs GROUP BY winch"',
         'winchkit library query . "SELECT time, value, std FROM estimates" --json',

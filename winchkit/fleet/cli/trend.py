@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import echo_json
@@ -18,7 +18,7 @@ from winchkit.errors import UsageError, suggest
 
 @click.command(
     "trend",
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit fleet trend . -p bench-spiral --effect cell-gain",
         "winchkit fleet trend . -p bench-spiral --effect cell-gain --limit cell-gain.gain_error=2%",

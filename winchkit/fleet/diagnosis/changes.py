@@ -42,7 +42,7 @@ _SEED = 1962
 
 
 @dataclass(frozen=True)
-class Series:
+class ParameterSeries:
     """Estimates of one parameter of one winch, in the order of time."""
 
     times: Array
@@ -92,7 +92,7 @@ class Change:
     """Date of a step; None for a trend."""
 
 
-def session_variance(series: Sequence[Series]) -> Variance:
+def session_variance(series: Sequence[ParameterSeries]) -> Variance:
     """Variance τ² of the session effect, from successive differences of all series.
 
     A step appears in one difference and a trend in each by a little; the estimate is the robust
@@ -106,7 +106,7 @@ def session_variance(series: Sequence[Series]) -> Variance:
     return Variance(found.value / 2, found.dof)
 
 
-def change_of(series: Series, between: Variance) -> Change | None:
+def change_of(series: ParameterSeries, between: Variance) -> Change | None:
     """Largest change of a series; None with fewer than four sessions.
 
     Notes
@@ -149,7 +149,7 @@ def change_of(series: Series, between: Variance) -> Change | None:
     )
 
 
-def step_date(series: Series, between: Variance) -> StepDate:
+def step_date(series: ParameterSeries, between: Variance) -> StepDate:
     """Posterior of the date of a step whose level and height are unknown.
 
     Uniform prior over time, flat priors of level and height: the probability of the interval

@@ -21,7 +21,7 @@ from typing import Any, Literal
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.fleet.diagnosis.changes import Change, Series, change_of, session_variance
+from winchkit.fleet.diagnosis.changes import Change, ParameterSeries, change_of, session_variance
 from winchkit.fleet.diagnosis.limit_date import LimitDate, limit_date
 from winchkit.fleet.diagnosis.partial_pooling import PartialPooling, odd_p_values, partial_pooling
 from winchkit.fleet.diagnosis.robust_variance import Variance
@@ -55,7 +55,7 @@ class WinchHistory:
     odd_q_value: float
     """Adjusted p-value of being one of the other winches; NaN with fewer than four winches."""
     rms_per_unit: Mapping[str, float]
-    series: Series
+    series: ParameterSeries
     """Own estimates of the sessions."""
     limit_value: float | None = None
     """Value that must not be reached; None without one."""
@@ -258,10 +258,10 @@ def fleet_history(
 
 
 @dataclass(frozen=True)
-class _Tested:
+class _ParameterTests:
     """Tests of one parameter, of every winch in order."""
 
-    series: list[Series]
+    series: list[ParameterSeries]
     between: Variance
     changes: list[Change | None]
     values: Array
@@ -270,12 +270,12 @@ class _Tested:
     odd: Array
 
 
-def _tested(group: Mapping[str, Sequence[SessionEstimate]]) -> _Tested:
+def _tested(group: Mapping[str, Sequence[SessionEstimate]]) -> _ParameterTests:
     values = [np.array([e.value for e in own]) for own in group.values()]
     stated = [np.array([e.std for e in own]) for own in group.values()]
     power = power_of_stated(values, stated)
     series = [
-        Series(np.array([e.time for e in own]), y, moderated_stds(s, power))
+        ParameterSeries(np.array([e.time for e in own]), y, moderated_stds(s, power))
         for own, y, s in zip(group.values(), values, stated, strict=True)
     ]
     between = session_variance(series)
@@ -285,10 +285,12 @@ def _tested(group: Mapping[str, Sequence[SessionEstimate]]) -> _Tested:
     ).T
     pooling = partial_pooling(present, stds)
     odd = odd_p_values(present, stds)
-    return _Tested(series, between, changes, present, stds, pooling, odd)
+    return _ParameterTests(series, between, changes, present, stds, pooling, odd)
 
 
-def _present(series: Series, change: Change | None, between: Variance) -> tuple[float, float]:
+def _present(
+    series: ParameterSeries, change: Change | None, between: Variance
+) -> tuple[float, float]:
     """Present value: of the changed model where the change alone is significant, else the mean."""
     if _p_value(change) < _FALSE_DISCOVERY_RATE and change is not None:
         return change.level, change.level_std

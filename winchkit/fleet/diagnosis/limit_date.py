@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
-from winchkit.fleet.diagnosis.changes import Series
+from winchkit.fleet.diagnosis.changes import ParameterSeries
 from winchkit.fleet.diagnosis.robust_variance import Variance
 
 
@@ -29,7 +29,7 @@ class LimitDate:
     latest: float
 
 
-def limit_date(series: Series, between: Variance, limit: float) -> LimitDate | None:
+def limit_date(series: ParameterSeries, between: Variance, limit: float) -> LimitDate | None:
     """Date at which the trend of a series reaches a limit; None where its rate leaves none.
 
     ``limit``: value of the parameter, SI, not zero.

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Place, Step
 from winchkit.fleet.diagnosis.anova import SharedAttribution, SharedError
 from winchkit.fleet.diagnosis.meta_analysis import Pooled, SharedEffect
-from winchkit.quantity_text import Scale, percent, quantity, scale_for, significant, unbroken
+from winchkit.quantity_text import PrintScale, percent, quantity, scale_for, significant, unbroken
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import fleet_ladders
 from winchkit.report.html.markup import Markup, compact, element, folded, section, table
@@ -119,7 +119,7 @@ def error_rows(found: Mapping[str, Comparison]) -> list[list[str]]:
     return rows
 
 
-def _beside_noise(error: OutputError, scale: Scale) -> str:
+def _beside_noise(error: OutputError, scale: PrintScale) -> str:
     """``2.10 mm (0.13)``."""
     if error.noise_rms is None:
         return scale.text(error.rms)

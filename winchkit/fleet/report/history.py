@@ -11,7 +11,7 @@ from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, Winch
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
 from winchkit.fleet.report.text import beyond_text, change_text, day_text, odd_texts, swap_text
 from winchkit.quantity_text import unbroken
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.html.markup import Markup, element, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
@@ -96,8 +96,8 @@ def _figure(parameter: FleetParameter, winch: WinchHistory) -> Figure:
     factor, unit = (100.0, "%") if share else (1.0, parameter.unit)
     series = winch.series
     start = float(series.times[0])
-    fit = Series("fitted", "with", *_fitted(winch, start, factor), "line")
-    points = Series(
+    fit = FigureSeries("fitted", "with", *_fitted(winch, start, factor), "line")
+    points = FigureSeries(
         "sessions", "today", (series.times - start) / _DAY, factor * series.values, "points"
     )
     std = factor * float(np.median(series.stds))
@@ -105,8 +105,8 @@ def _figure(parameter: FleetParameter, winch: WinchHistory) -> Figure:
         f"{winch.winch}-{parameter.effect}-{parameter.parameter}".replace(" ", "-"),
         f"{winch.winch}: {parameter.effect}",
         f"{parameter.parameter}, a point per session (standard deviation {std:.2g} {unit}).",
-        Axis(f"days since {day_text(start)}"),
-        (Panel(Axis(parameter.parameter, unit), (fit, points)),),
+        FigureAxis(f"days since {day_text(start)}"),
+        (Panel(FigureAxis(parameter.parameter, unit), (fit, points)),),
         height=_HEIGHT,
     )
 

@@ -14,7 +14,7 @@ from starlette.routing import Route
 from winchkit.fleet.web.fleet import Fleet
 from winchkit.fleet.web.runs import Library
 from winchkit.web.views import Order, View
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 
 class LibraryView(View):
@@ -22,7 +22,7 @@ class LibraryView(View):
 
     name = "library"
 
-    def __init__(self, workspace: Workspace, folder: Path) -> None:
+    def __init__(self, workspace: DiagnoseView, folder: Path) -> None:
         super().__init__(workspace, folder)
         self.library = Library(folder)
         self.fleet = Fleet(self.library, workspace.effects)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.quantity_text import plain
-from winchkit.report.figures.figure import Axis
+from winchkit.report.figures.figure import FigureAxis
 from winchkit.report.words.vocabulary import VARIABLE_NAMES
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
@@ -57,7 +57,7 @@ class Range:
         return [(v, f"{v + 0.0:.{decimals}f}".replace("-", "−")) for v in values]
 
 
-def range_of(axis: Axis, values: Iterable[float]) -> Range:
+def range_of(axis: FigureAxis, values: Iterable[float]) -> Range:
     """The range of an axis: its limits, else that of finite values with a margin."""
     if axis.limits is not None:
         return Range(*axis.limits, axis.logarithmic)
@@ -116,9 +116,11 @@ class AxisLabel:
         """SI values in the unit of the axis."""
         return 10.0**values if self.logarithmic else values / self.worth
 
-    def axis(self, limits: tuple[float, float] | None = None) -> Axis:
+    def axis(self, limits: tuple[float, float] | None = None) -> FigureAxis:
         """The axis of the variable."""
-        return Axis(self.name, self.unit, self.logarithmic, limits, categories=self.categories)
+        return FigureAxis(
+            self.name, self.unit, self.logarithmic, limits, categories=self.categories
+        )
 
 
 _WITH_A_SIGN = {

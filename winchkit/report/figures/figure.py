@@ -23,7 +23,7 @@ _FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 
 
 @dataclass(frozen=True)
-class Axis:
+class FigureAxis:
     """Name, unit and range of an axis."""
 
     name: str
@@ -43,7 +43,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Series:
+class FigureSeries:
     """Values over the x axis, (n,) each; NaN where there is none."""
 
     name: str
@@ -58,7 +58,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Cells:
+class GridCells:
     """A value per cell of a grid: numbers of samples, or signed means."""
 
     name: str
@@ -80,11 +80,11 @@ class Cells:
 class Panel:
     """Series over one y axis."""
 
-    y: Axis
-    series: tuple[Series, ...] = ()
+    y: FigureAxis
+    series: tuple[FigureSeries, ...] = ()
     band: float | None = None
     """Half width of the noise band around zero."""
-    cells: Cells | None = None
+    cells: GridCells | None = None
     floor: float | None = None
     """Value of x up to which the panel is shaded: the noise floor of a ratio."""
     share: float = 1.0
@@ -102,7 +102,7 @@ class RunMark:
 
 
 @dataclass(frozen=True)
-class Table:
+class FigureData:
     """The data of a figure as columns; texts are references into ``words``."""
 
     head: tuple[str, ...]
@@ -135,7 +135,7 @@ class Figure:
     title: str
     caption: str
     """Text alternative and figure caption."""
-    x: Axis
+    x: FigureAxis
     panels: tuple[Panel, ...]
     marks: tuple[RunMark, ...] = ()
     left_out: tuple[tuple[float, float], ...] = ()
@@ -149,7 +149,7 @@ class Figure:
     height: float = 268.0
     """Of all panels together, px."""
 
-    def table(self) -> Table:
+    def table(self) -> FigureData:
         """All data of the figure."""
         cells = next((p.cells for p in self.panels if p.cells is not None), None)
         if self.panels[0].y.categories:
@@ -159,7 +159,7 @@ class Figure:
         return _joined(_cells_table(self, cells), _series_table(self))
 
 
-def _series_table(figure: Figure) -> Table:
+def _series_table(figure: Figure) -> FigureData:
     """Rows of every set of series with one x, in sequence; a column per series."""
     every = [(panel, one) for panel in figure.panels for one in panel.series if one.name]
     groups: list[tuple[Array, list[int]]] = []
@@ -181,16 +181,16 @@ def _series_table(figure: Figure) -> Table:
     data = [_numbers(column) for column in (x, *columns)]
     if figure.names:
         places: list[float | None] = [int(place) - 1 for place in x]
-        return Table((figure.x.name, *head[1:]), (places, *data[1:]), figure.names)
+        return FigureData((figure.x.name, *head[1:]), (places, *data[1:]), figure.names)
     if not figure.marks:
-        return Table(tuple(head), tuple(data))
+        return FigureData(tuple(head), tuple(data))
     starts = [mark.at for mark in figure.marks]
     runs = np.maximum(np.searchsorted(starts, x, side="right") - 1, 0)
     number: list[float | None] = [int(run) for run in runs]
-    return Table(("run", *head), (number, *data), tuple(mark.run for mark in figure.marks))
+    return FigureData(("run", *head), (number, *data), tuple(mark.run for mark in figure.marks))
 
 
-def _category_table(figure: Figure) -> Table:
+def _category_table(figure: Figure) -> FigureData:
     """A row per category of the y axis; a column per named series with its x."""
     panel = figure.panels[0]
     names = tuple(name for _, name in panel.y.categories)
@@ -201,20 +201,20 @@ def _category_table(figure: Figure) -> Table:
         values = [found.get(place, float("nan")) for place, _ in panel.y.categories]
         columns.append(_numbers(values))
         head.append(_headed(f"{figure.x.name}, {one.name}", figure.x.unit))
-    return Table(tuple(head), tuple(columns), names)
+    return FigureData(tuple(head), tuple(columns), names)
 
 
-def _joined(first: Table, second: Table) -> Table:
+def _joined(first: FigureData, second: FigureData) -> FigureData:
     """Rows of two numeric tables below each other, with the columns of both."""
     if len(second.head) < 2:
         return first
     rows = [len(table.columns[0]) for table in (first, second)]
     before = [[*column, *([None] * rows[1])] for column in first.columns]
     after = [[*([None] * rows[0]), *column] for column in second.columns]
-    return Table((*first.head, *second.head), (*before, *after))
+    return FigureData((*first.head, *second.head), (*before, *after))
 
 
-def _cells_table(figure: Figure, cells: Cells) -> Table:
+def _cells_table(figure: Figure, cells: GridCells) -> FigureData:
     """A row per cell that holds a value."""
     across, up = np.nonzero(np.isfinite(cells.values))
     y = figure.panels[0].y
@@ -234,7 +234,7 @@ def _cells_table(figure: Figure, cells: Cells) -> Table:
     if cells.counts is not None:
         head.append("samples")
         columns.append(cells.counts[across, up].astype(float))
-    return Table(tuple(head), tuple(_numbers(column) for column in columns))
+    return FigureData(tuple(head), tuple(_numbers(column) for column in columns))
 
 
 def _headed(name: str, unit: str) -> str:

@@ -9,7 +9,7 @@ from math import isfinite, nan
 import numpy as np
 
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputError, OutputFit
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
@@ -21,7 +21,7 @@ _LEAST, _MOST = 0.8, 1.3
 
 
 @dataclass(frozen=True)
-class _Row:
+class _ErrorRow:
     """Errors over the noise of one row."""
 
     name: str
@@ -75,25 +75,27 @@ def _named(one: Comparison | Diagnosis) -> bool:
     return isinstance(one, Diagnosis) and bool(one.steps)
 
 
-def _row(name: str, output: OutputError | OutputFit, extended: bool = True) -> _Row | None:
+def _row(name: str, output: OutputError | OutputFit, extended: bool = True) -> _ErrorRow | None:
     """Errors over the noise; None where the noise is unknown."""
     if not output.noise_rms:
         return None
     if isinstance(output, OutputFit):
         before, after = output.heldout_rms_before, output.heldout_rms_after
-        return _Row(name, before / output.noise_rms, after / output.noise_rms if extended else nan)
-    return _Row(name, output.rms / output.noise_rms, nan)
+        return _ErrorRow(
+            name, before / output.noise_rms, after / output.noise_rms if extended else nan
+        )
+    return _ErrorRow(name, output.rms / output.noise_rms, nan)
 
 
-def _figure(name: str, title: str, rows: Sequence[_Row], changed: str, source: str) -> Figure:
+def _figure(name: str, title: str, rows: Sequence[_ErrorRow], changed: str, source: str) -> Figure:
     places = np.arange(float(len(rows)), 0.0, -1.0)
     today = np.array([row.before for row in rows])
-    series = [Series("today", "today", today, places, "points")]
+    series = [FigureSeries("today", "today", today, places, "points")]
     if changed:
         then = np.array([row.after for row in rows])
         ends = np.column_stack([today, then, np.full(len(rows), np.nan)]).ravel()
-        joined = Series("", "with", ends, np.repeat(places, 3), "line")
-        series = [joined, *series, Series(changed, "with", then, places, "points")]
+        joined = FigureSeries("", "with", ends, np.repeat(places, 3), "line")
+        series = [joined, *series, FigureSeries(changed, "with", then, places, "points")]
     every = [v for one in series for v in one.x.tolist() if isfinite(v)]
     least = min(_LEAST, *every) if every else _LEAST
     limits = (0.9 * least if least < _LEAST else _LEAST, max(2.0, _MOST * max(every, default=1.0)))
@@ -102,10 +104,10 @@ def _figure(name: str, title: str, rows: Sequence[_Row], changed: str, source: s
         name,
         title,
         "Rms of the error over that of the noise; left of the line at 1 is noise.",
-        Axis("error ÷ noise", logarithmic=True, limits=limits),
+        FigureAxis("error ÷ noise", logarithmic=True, limits=limits),
         (
             Panel(
-                Axis("", limits=(0.4, len(rows) + 0.6), categories=named),
+                FigureAxis("", limits=(0.4, len(rows) + 0.6), categories=named),
                 tuple(series),
                 floor=1.0,
             ),

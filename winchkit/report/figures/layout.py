@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.quantity_text import plain
 from winchkit.report.figures.axes import Range, range_of
-from winchkit.report.figures.figure import Axis, Cells, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, GridCells, Panel
 from winchkit.report.figures.tokens import STYLES
 
 WIDE, NARROW = 700, 340
@@ -203,7 +203,9 @@ def _legend(figure: Figure) -> Iterator[tuple[str, tuple[Shape, ...]]]:
                 yield name, _marks(one, (middle if dotted else across,))
 
 
-def _marks(one: Series, parts: tuple[Array, ...], *, cased: bool = False) -> tuple[Shape, ...]:
+def _marks(
+    one: FigureSeries, parts: tuple[Array, ...], *, cased: bool = False
+) -> tuple[Shape, ...]:
     """The shapes of a series: a mean over cells has a casing, points of ``with`` are rings."""
     style = f"{one.tone}-{one.mark}"
     if one.mark in {"line", "mean"}:
@@ -268,7 +270,7 @@ def _across(at: float) -> Array:
     return np.array([[0.0, at], [1.0, at]])
 
 
-def _parts(one: Series, x: Range, y: Range, starts: Sequence[float]) -> tuple[Array, ...]:
+def _parts(one: FigureSeries, x: Range, y: Range, starts: Sequence[float]) -> tuple[Array, ...]:
     """Polylines between gaps and starts of runs, or all dots."""
     points = np.column_stack([x.shares(one.x), 1 - y.shares(one.y)])
     good = np.isfinite(points).all(axis=1)
@@ -286,7 +288,7 @@ def _parts(one: Series, x: Range, y: Range, starts: Sequence[float]) -> tuple[Ar
     )  # fmt: skip
 
 
-def _cell_shapes(cells: Cells, x: Range, y: Range) -> list[Shape]:
+def _cell_shapes(cells: GridCells, x: Range, y: Range) -> list[Shape]:
     """Cells by class of colour; a minus on the negative ones, for print in grey."""
     classes: dict[str, list[tuple[float, float, float, float]]] = {}
     across, up = np.nonzero(np.isfinite(cells.values))
@@ -305,7 +307,7 @@ def _cell_shapes(cells: Cells, x: Range, y: Range) -> list[Shape]:
     return [*shapes, Shape("minus", "line", tuple(strong))] if strong else shapes
 
 
-def _class(value: float, cells: Cells) -> str:
+def _class(value: float, cells: GridCells) -> str:
     """Style of a cell."""
     number = int(np.searchsorted(cells.levels, abs(value) * (1 + 1e-9), side="right"))
     if cells.signed:
@@ -392,7 +394,7 @@ def _fitting(text: str, room: float) -> str:
     return f"{text[: most - 1]}…" if most >= 4 else ""
 
 
-def _x_ticks(axis: Axis, x: Range, left: float, width: float) -> list[tuple[float, str]]:
+def _x_ticks(axis: FigureAxis, x: Range, left: float, width: float) -> list[tuple[float, str]]:
     if axis.categories:
         ticks = list(axis.categories)
     elif axis.unit == "°" and axis.limits == (0.0, 360.0):
@@ -405,7 +407,7 @@ def _x_ticks(axis: Axis, x: Range, left: float, width: float) -> list[tuple[floa
     return inside
 
 
-def _y_ticks(axis: Axis, y: Range, height: float) -> list[tuple[float, str]]:
+def _y_ticks(axis: FigureAxis, y: Range, height: float) -> list[tuple[float, str]]:
     if axis.categories:
         return list(axis.categories)
     ticks = y.ticks(max(3, min(5, int(height / _PER_TICK_Y))))

@@ -8,21 +8,21 @@ import numpy as np
 
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.model.variables import ANGLES
-from winchkit.quantity_text import Scale, percent
+from winchkit.quantity_text import PrintScale, percent
 from winchkit.report.figures.axes import AxisLabel, reading
-from winchkit.report.figures.figure import Cells, Figure, Panel
+from winchkit.report.figures.figure import Figure, GridCells, Panel
 from winchkit.report.figures.layout import signed_levels
 from winchkit.report.figures.residuals import Residuals
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 
-def map_text(drawn: ResidualMap, scale: Scale) -> str:
+def map_text(drawn: ResidualMap, scale: PrintScale) -> str:
     """``over free length and load 93 %, most +1.2 mm at 3 m, 196 N``."""
     names = " and ".join(_name(name) for name in drawn.over)
     return f"over {names} {percent(drawn.share)}, {largest_text(drawn, scale)}"
 
 
-def largest_text(drawn: ResidualMap, scale: Scale) -> str:
+def largest_text(drawn: ResidualMap, scale: PrintScale) -> str:
     """``most +1.2 mm at 3 m, 196 N``."""
     across, up = drawn.largest
     mean = float(drawn.mean[across, up])
@@ -43,10 +43,10 @@ def _name(variable: str) -> str:
 
 
 def _place(how: AxisLabel, value: float) -> str:
-    return Scale(how.unit, 1.0).text(float(how.shown(value)), 2)
+    return PrintScale(how.unit, 1.0).text(float(how.shown(value)), 2)
 
 
-def signed(value: float, scale: Scale) -> str:
+def signed(value: float, scale: PrintScale) -> str:
     """A value with its sign: ``+1.2 mm``."""
     text = scale.text(value, 2)
     return f"+{text}" if value > 0 else text
@@ -58,7 +58,7 @@ _ABOVE_NOISE = 2.0
 """Least value of full colour as a multiple of the noise, so that values near it are pale."""
 
 
-def map_figures(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Figure]]:
+def map_figures(residuals: Residuals, scales: Mapping[str, PrintScale]) -> dict[str, list[Figure]]:
     """Maps per output: the two with the largest shares, or the first before and after a change."""
     out: dict[str, list[Figure]] = {}
     for output, scale in scales.items():
@@ -86,13 +86,13 @@ def map_figures(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, 
 
 
 def _figure(
-    name: str, state: str, drawn: ResidualMap, peak: float, *, scale: Scale, source: str
+    name: str, state: str, drawn: ResidualMap, peak: float, *, scale: PrintScale, source: str
 ) -> Figure:
     readings = [map_reading(name) for name in drawn.over]
     x, y = (np.asarray(r.shown(edges)) for r, edges in zip(readings, drawn.edges, strict=True))
     output = OUTPUT_NAMES.get(drawn.output, drawn.output)
     over = " and ".join(_name(name) for name in drawn.over)
-    cells = Cells(
+    cells = GridCells(
         "mean residual",
         scale.label,
         x,

@@ -86,7 +86,7 @@ _DIGITS = 5
 
 
 @dataclass(frozen=True)
-class Curve:
+class ResidualCurve:
     """Mean residual of one output along one variable, SI."""
 
     over: Attribution
@@ -123,7 +123,7 @@ def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, At
     return in_units_of(regression.dataset.profile, out)
 
 
-def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attribution) -> Curve:
+def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attribution) -> ResidualCurve:
     """The curve of a residual, (rows,), over a variable."""
     x, error = [], []
     for segment, time in zip(regression.segments, regression.in_time(residual), strict=True):
@@ -137,7 +137,7 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attributio
         values = np.mod(values, 2 * np.pi)
     edges = bin_edges(values, over, 2 * np.pi)
     centres, (mean,) = bin_means(values, [np.concatenate(error)], edges)
-    return Curve(over, centres, mean)
+    return ResidualCurve(over, centres, mean)
 
 
 def is_within_turn(over: Attribution) -> bool:

@@ -15,17 +15,17 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
-from winchkit.diagnosis.residuals.traces import Trace, traces_of
+from winchkit.diagnosis.residuals.traces import OutputTrace, traces_of
 from winchkit.model.stages import RESULT_UNITS
-from winchkit.quantity_text import Scale, percent, plain, scale_for
+from winchkit.quantity_text import PrintScale, percent, plain, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
-    Axis,
-    Cells,
     Figure,
+    FigureAxis,
+    FigureSeries,
+    GridCells,
     Panel,
     RunMark,
-    Series,
 )
 from winchkit.report.figures.layout import density_levels
 from winchkit.report.figures.reduction import (
@@ -84,7 +84,7 @@ class OutputFigures:
     """The figures of one output."""
 
     output: str
-    scale: Scale
+    scale: PrintScale
     """Of its residual."""
     over_time: Figure
     over_variable: Figure | None
@@ -97,7 +97,7 @@ class _Curves:
     """Signals of one output by run, SI; NaN where they are not compared."""
 
     output: str
-    scale: Scale
+    scale: PrintScale
     runs: tuple[int, ...]
     measured: tuple[Array, ...]
     before: tuple[Array, ...]
@@ -154,7 +154,7 @@ def _curves(residuals: Residuals, output: str) -> _Curves:
     noise = residuals.noise.get(name)
     runs = tuple(s.run for s in regression.segments if s.output == output)
 
-    def traces(rows: Array) -> list[Trace]:
+    def traces(rows: Array) -> list[OutputTrace]:
         return [trace for trace in traces_of(regression, rows) if trace.output == output]
 
     today = traces(residuals.before)
@@ -206,13 +206,15 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
     x = np.concatenate(times)
     measured = joined(curves.measured, 1.0)
     size = scale_for(float(np.nanmax(np.abs(measured), initial=0.0)), RESULT_UNITS[curves.output])
-    signals = [Series("measured", "measured", x, measured / size.worth)]
+    signals = [FigureSeries("measured", "measured", x, measured / size.worth)]
     errors = []
     for tone, name, parts in curves.states:
         error = joined(parts, 1.0)
         predicted = (measured - error) / size.worth
-        signals.append(Series(f"predicted, {name}", tone, x, predicted, legend=name))
-        errors.append(Series(f"residual, {name}", tone, x, error / curves.scale.worth, legend=name))
+        signals.append(FigureSeries(f"predicted, {name}", tone, x, predicted, legend=name))
+        errors.append(
+            FigureSeries(f"residual, {name}", tone, x, error / curves.scale.worth, legend=name)
+        )
     if len(errors) == 1:
         signals[1] = replace(signals[1], name="predicted", legend="predicted, residual")
         errors[0] = replace(errors[0], name="residual", legend="predicted, residual")
@@ -233,10 +235,19 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
         f"{name} over time",
         f"Measured and predicted {name.lower()}{filtered}, and below them the residual, measured "
         f"less predicted; all runs in sequence.{band}{shaded}{short}",
-        Axis("time", "s", limits=(0.0, start)),
+        FigureAxis("time", "s", limits=(0.0, start)),
         (
-            Panel(Axis(f"measured and predicted{filtered}", size.label), tuple(signals), share=0.9),
-            Panel(Axis("residual", curves.scale.label, zero=True), tuple(errors), noise, share=1.1),
+            Panel(
+                FigureAxis(f"measured and predicted{filtered}", size.label),
+                tuple(signals),
+                share=0.9,
+            ),
+            Panel(
+                FigureAxis("residual", curves.scale.label, zero=True),
+                tuple(errors),
+                noise,
+                share=1.1,
+            ),
         ),
         tuple(marks),
         tuple(left_out),
@@ -278,17 +289,17 @@ def _over_variable(
     x, states = variable[good], [(t, n, values[good]) for t, n, values in states]
     centres, means = _means(x, [v for _, _, v in states], bin_edges(x, followed, _DEGREES))
     lines = [
-        Series(f"mean, {name}" if len(states) > 1 else "mean", tone, centres, mean, "mean")
+        FigureSeries(f"mean, {name}" if len(states) > 1 else "mean", tone, centres, mean, "mean")
         for (tone, name, _), mean in zip(states, means, strict=True)
     ]
     first = states[0][2]
-    samples: tuple[Series, ...] = ()
+    samples: tuple[FigureSeries, ...] = ()
     cells = None
     name = "residual" if len(states) == 1 else f"residual, {states[0][1]}"
     limits = (0.0, _DEGREES) if within else None
     if len(x) <= _DOTS:
         spread = _spread(x) if followed.variable == "direction" else x
-        samples = (Series(name, "today", spread, first, "dots"),)
+        samples = (FigureSeries(name, "today", spread, first, "dots"),)
     else:
         cells, limits = _density(x, first, how.logarithmic, limits)
     noise = None if curves.noise is None else curves.noise / curves.scale.worth
@@ -307,7 +318,7 @@ def _over_variable(
         how.axis(limits),
         (
             Panel(
-                Axis("residual", curves.scale.label, zero=True),
+                FigureAxis("residual", curves.scale.label, zero=True),
                 (*samples, *lines),
                 noise,
                 cells,
@@ -330,7 +341,7 @@ def _means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list
 
 def _density(
     x: Array, y: Array, logarithmic: bool, limits: tuple[float, float] | None
-) -> tuple[Cells, tuple[float, float] | None]:
+) -> tuple[GridCells, tuple[float, float] | None]:
     """Numbers of samples per cell; every sample is counted, extremes in cells of their own."""
     if logarithmic:
         low, high = np.quantile(x[x > 0], [_TAILS, 1.0])
@@ -345,7 +356,7 @@ def _density(
     counts = np.histogram2d(x, y, bins=(x_edges, y_edges))[0]
     levels = density_levels(int(counts.max()))
     shown = np.where(counts > 0, counts, np.nan)
-    cells = Cells("samples per cell", "", x_edges, y_edges, shown, levels)
+    cells = GridCells("samples per cell", "", x_edges, y_edges, shown, levels)
     return cells, (float(x_edges[0]), float(x_edges[-1])) if limits is None else limits
 
 

@@ -11,7 +11,7 @@ from winchkit.effects.empirical import empirical_id
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import reading
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
@@ -52,8 +52,12 @@ def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
         how.axis(),
         (
             Panel(
-                Axis("residual", scale.label, zero=True),
-                (Series("residual, mean", "today", how.shown(at), residual / scale.worth, "mean"),),
+                FigureAxis("residual", scale.label, zero=True),
+                (
+                    FigureSeries(
+                        "residual, mean", "today", how.shown(at), residual / scale.worth, "mean"
+                    ),
+                ),
                 None if noise is None else noise / scale.worth,
             ),
         ),
@@ -99,12 +103,12 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
         how.axis(),
         (
             Panel(
-                Axis("residual", scale.label, zero=True),
+                FigureAxis("residual", scale.label, zero=True),
                 (
-                    Series(
+                    FigureSeries(
                         "to explain, mean", "today", how.shown(at.x), at.mean / scale.worth, "mean"
                     ),
-                    Series(
+                    FigureSeries(
                         step.effects[0], "with", how.shown(law.x), law.mean / scale.worth, "mean"
                     ),
                 ),

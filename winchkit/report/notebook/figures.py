@@ -9,10 +9,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.residuals.traces import PoseTrace, Trace
+from winchkit.diagnosis.residuals.traces import OutputTrace, PoseTrace
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.errors import UsageError, suggest
-from winchkit.quantity_text import Scale, scale_for
+from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.reduction import decimated
 from winchkit.report.notebook.style import BLACK, BLUE, GREY, ORANGE, WIDTH, Size, new_figure
 from winchkit.report.words.sentence import capital
@@ -52,7 +52,7 @@ def result_figure(
     noise = {name: fit.noise_rms for name, fit in result.outputs.items()}
     if any(isinstance(trace, PoseTrace) for trace in traces):
         return _pose_figure([t for t in traces if isinstance(t, PoseTrace)], noise, figsize)
-    own = [trace for trace in traces if isinstance(trace, Trace)]
+    own = [trace for trace in traces if isinstance(trace, OutputTrace)]
     outputs = list(dict.fromkeys(trace.output for trace in own))
     with new_figure(figsize or (WIDTH, _OUTPUT_HEIGHT * len(outputs) + 0.3)) as figure:
         # The width of the letters of the labels differs; their axes begin at one place.
@@ -128,7 +128,9 @@ def _pose_figure(
     return figure
 
 
-def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float | None) -> None:
+def _draw_output(
+    upper: Axes, lower: Axes, traces: Sequence[OutputTrace], noise: float | None
+) -> None:
     """Measured and predicted above, the residual with the noise band below."""
     starts = _starts(traces)
     measured = [trace.measured for trace in traces]
@@ -162,14 +164,14 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
     lower.set_ylabel(axis_label("residual", fine, broken=True))
 
 
-def _starts(traces: Sequence[Trace]) -> list[float]:
+def _starts(traces: Sequence[OutputTrace]) -> list[float]:
     """Start of every run on an axis on which they follow each other."""
     lengths = [float(trace.time[-1]) for trace in traces]
     gap = _GAP * sum(lengths) / len(lengths)
     return [float(sum(lengths[:k]) + k * gap) for k in range(len(lengths))]
 
 
-def _name_runs(axis: Axes, traces: Sequence[Trace]) -> None:
+def _name_runs(axis: Axes, traces: Sequence[OutputTrace]) -> None:
     """Names of the runs above their curves, where there are few."""
     if not 1 < len(traces) <= _NAMED_RUNS:
         return
@@ -186,7 +188,7 @@ def _name_runs(axis: Axes, traces: Sequence[Trace]) -> None:
         )
 
 
-def _band(axis: Axes, noise: float | None, scale: Scale) -> None:
+def _band(axis: Axes, noise: float | None, scale: PrintScale) -> None:
     if noise is not None and np.isfinite(noise):
         size = noise / scale.worth
         axis.axhspan(-size, size, color=GREY, alpha=0.3, lw=0, label="noise, ± rms")
@@ -198,7 +200,7 @@ def legend(figure: Figure, *axes: Axes) -> None:
     figure.legend(*zip(*pairs, strict=True), loc="outside upper center", ncols=4)
 
 
-def common_scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> Scale:
+def common_scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> PrintScale:
     """Unit for the largest value, or for some rms of it."""
     values = np.concatenate(
         [np.zeros(0), *(np.abs(part).ravel() for part in parts if part is not None)]
@@ -208,10 +210,10 @@ def common_scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -
         return scale_for(0.0, unit)
     size = float(np.max(known)) if share == 1.0 else share * float(np.sqrt(np.mean(known**2)))
     # Angles beyond a turn are in radians, as in the file.
-    return Scale("rad", 1.0) if unit == "rad" and size > 2 * np.pi else scale_for(size, unit)
+    return PrintScale("rad", 1.0) if unit == "rad" and size > 2 * np.pi else scale_for(size, unit)
 
 
-def axis_label(name: str, scale: Scale, *, broken: bool = False) -> str:
+def axis_label(name: str, scale: PrintScale, *, broken: bool = False) -> str:
     """``Name [unit]``, on two lines where it is broken."""
     unit = f" [{scale.label}]" if scale.label else ""
     return capital(name) + (unit.replace(" [", "\n[") if broken else unit)
@@ -222,15 +224,15 @@ def _name(output: str) -> str:
 
 
 def _chosen(
-    traces: Sequence[Trace | PoseTrace],
+    traces: Sequence[OutputTrace | PoseTrace],
     output: str | Sequence[str] | None,
     run: str | Sequence[str] | None,
-) -> list[Trace | PoseTrace]:
+) -> list[OutputTrace | PoseTrace]:
     """Traces of the chosen outputs and runs."""
     if not traces:
         raise UsageError("this result holds no samples to draw; call compare or diagnose again")
     outputs = list(dict.fromkeys(trace.output for trace in traces))
-    runs = list(dict.fromkeys(trace.run for trace in traces if isinstance(trace, Trace)))
+    runs = list(dict.fromkeys(trace.run for trace in traces if isinstance(trace, OutputTrace)))
     kept = outputs if output is None else _known(output, outputs, "output")
     kept_runs = runs if run is None else _known(run, runs, "run")
     return [

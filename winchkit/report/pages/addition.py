@@ -12,7 +12,7 @@ from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, lead
-from winchkit.report.reproducibility import Command, repeat
+from winchkit.report.reproducibility import CommandLine, repeat
 from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.sentence import (
     capital,
@@ -27,7 +27,7 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning, values_text
 def addition_sections(
     addition: Addition,
     figures: Sequence[Markup],
-    command: Command,
+    command: CommandLine,
     better: str,
     *,
     title: str = "",
@@ -65,7 +65,7 @@ def addition_sentence(addition: Addition) -> str:
 
 
 def _lead(
-    addition: Addition, better: str, command: Command, *, title: str, ladder: Figure | None
+    addition: Addition, better: str, command: CommandLine, *, title: str, ladder: Figure | None
 ) -> Markup:
     term, _ = addition.added
     chip, tone = _chip(addition.outputs)

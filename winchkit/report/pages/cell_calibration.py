@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from winchkit.quantity_text import scale_for
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.html.markup import Markup, element, folded, join, section, table
 from winchkit.report.html.page import figure_block, page
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.fit import CellFit
-    from winchkit.calibration.cell.fit import Figure as Merit
+    from winchkit.calibration.cell.fit import FigureOfMerit as Merit
     from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration
 
@@ -194,14 +194,18 @@ def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
     going = np.array([point.going for point in points])
     order = np.argsort(load)
     size = scale_for(float(np.max(np.abs(residual), initial=0.0)), "N")
-    readings = [Series("fitted", "measured", load[order], (load - residual)[order])]
+    readings = [FigureSeries("fitted", "measured", load[order], (load - residual)[order])]
     errors = []
     for word, tone in _TONES.items():
         own = going == word
         name = f"load going {word}"
-        readings.append(Series(f"indicated, {name}", tone, load[own], shown[own], "points", name))
+        readings.append(
+            FigureSeries(f"indicated, {name}", tone, load[own], shown[own], "points", name)
+        )
         errors.append(
-            Series(f"residual, {name}", tone, load[own], residual[own] / size.worth, "points", name)
+            FigureSeries(
+                f"residual, {name}", tone, load[own], residual[own] / size.worth, "points", name
+            )
         )
     return [
         Figure(
@@ -209,10 +213,10 @@ def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
             "Force over the load",
             "Indicated and fitted force, and the true less the fitted force; a difference of up "
             "and down is hysteresis.",
-            Axis("load", "N"),
+            FigureAxis("load", "N"),
             (
-                Panel(Axis("indicated and fitted", "N"), tuple(readings)),
-                Panel(Axis("residual", size.label, zero=True), tuple(errors)),
+                Panel(FigureAxis("indicated and fitted", "N"), tuple(readings)),
+                Panel(FigureAxis("residual", size.label, zero=True), tuple(errors)),
             ),
             source=f"calibration of {calibration.name}, {calibration.date.isoformat()}",
         )

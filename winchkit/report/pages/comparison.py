@@ -12,7 +12,7 @@ from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
-from winchkit.report.reproducibility import Command, repeat
+from winchkit.report.reproducibility import CommandLine, repeat
 from winchkit.report.words.headline import at_noise, comparison_headline, worst_outputs
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
@@ -27,7 +27,7 @@ def comparison_sections(
     comparison: Comparison,
     over: Mapping[str, Attribution],
     figures: Sequence[Markup],
-    command: Command,
+    command: CommandLine,
     *,
     title: str = "",
     ladder: Figure | None = None,
@@ -77,7 +77,7 @@ def _attributed(over: Attribution | None) -> str:
 def _lead(
     comparison: Comparison,
     over: Mapping[str, Attribution],
-    command: Command,
+    command: CommandLine,
     *,
     title: str,
     ladder: Figure | None,

@@ -17,7 +17,7 @@ from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.html.markup import Markup, element, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
-from winchkit.report.reproducibility import Command, repeat
+from winchkit.report.reproducibility import CommandLine, repeat
 from winchkit.report.words.sentence import (
     changes_text,
     error_text,
@@ -33,7 +33,7 @@ def sections(
     figures: Sequence[Markup],
     story: Sequence[str],
     truth: Mapping[str, object] | None,
-    command: Command,
+    command: CommandLine,
     *,
     title: str = "",
     unexplained: Sequence[Figure] = (),
@@ -86,7 +86,7 @@ def sections(
     )
 
 
-def _verdict(answer: Answer, command: Command, title: str, ladder: Figure | None) -> Markup:
+def _verdict(answer: Answer, command: CommandLine, title: str, ladder: Figure | None) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
     shown = f"Detectable with these {diagnosis.data}, among others: {listed(seen)}." if seen else ""
@@ -111,7 +111,7 @@ def _verdict(answer: Answer, command: Command, title: str, ladder: Figure | None
     )
 
 
-def _cure(diagnosis: Diagnosis, command: Command) -> str:
+def _cure(diagnosis: Diagnosis, command: CommandLine) -> str:
     """The command that adds the first effect, or continues without one."""
     if diagnosis.verdict == "adequate":
         return "None is needed."
@@ -188,7 +188,7 @@ def _truth(truth: Mapping[str, object] | None) -> Markup:
     return element("dl", *(part for pair in pairs for part in pair), class_="facts")
 
 
-def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
+def _commands(diagnosis: Diagnosis, command: CommandLine) -> list[str]:
     """Commands that reproduce the result and continue from it."""
     profile = command.profile
     commands = [command.compare(profile), command.diagnose(profile)]

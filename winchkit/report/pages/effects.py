@@ -11,7 +11,7 @@ from winchkit.effects.card import Signature, in_control, parameter_kind, signatu
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
 from winchkit.quantity_text import plain, scale_for
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import decimated
 from winchkit.report.html.markup import Markup, element, formula, section, table
 from winchkit.report.html.page import figure_block, page
@@ -108,7 +108,11 @@ def _drawing(effect: Effect) -> tuple[list[Figure], list[Markup]]:
     if not drawn.changes:
         text = "It has no effect on the standard motion."
         return [], [element("p", text, class_="quiet")]
-    over = Axis("pose of the standard robot, line 1") if effect.of_robots else Axis("time", "s")
+    over = (
+        FigureAxis("pose of the standard robot, line 1")
+        if effect.of_robots
+        else FigureAxis("time", "s")
+    )
     figures = [_figure(effect.id, drawn, name, over) for name in ("", *drawn.changes)]
     sizes = ", ".join(
         f"{parameter_name(p.name)} {_size(drawn.values[p.name], p.unit)}"
@@ -121,7 +125,7 @@ def _drawing(effect: Effect) -> tuple[list[Figure], list[Markup]]:
     return figures, [pair, element("p", text, class_="quiet")]
 
 
-def _figure(effect: str, drawn: Signature, output: str, over: Axis) -> Figure:
+def _figure(effect: str, drawn: Signature, output: str, over: FigureAxis) -> Figure:
     """The change of an output, or the free length for orientation; extremes are kept."""
     values = drawn.changes[output] if output else drawn.cable_length
     unit = OUTPUT_UNITS[output] if output else "m"
@@ -132,12 +136,12 @@ def _figure(effect: str, drawn: Signature, output: str, over: Axis) -> Figure:
         f"Change of the {name}." if output else "Free length of the nominal line, for orientation."
     )
     tone, label = ("today", "change") if output else ("plain", "free length")
-    series = Series(label, tone, drawn.time[rows], values[rows] / scale.worth)
+    series = FigureSeries(label, tone, drawn.time[rows], values[rows] / scale.worth)
     return Figure(
         f"signature-{effect}-{output or 'motion'}",
         capital(f"change of the {name}") if output else "Motion",
         caption,
         over,
-        (Panel(Axis(label, scale.label, zero=bool(output)), (series,)),),
+        (Panel(FigureAxis(label, scale.label, zero=bool(output)), (series,)),),
         source=f"effect {effect}",
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.profile_edit.history import LADDER_UNITS, Rung
+from winchkit.profile_edit.history import LADDER_UNITS, HistoryStep
 from winchkit.quantity_text import scale_for
 from winchkit.report.html.markup import Markup, element, join, section, table
 from winchkit.report.html.page import page
@@ -17,7 +17,7 @@ _ROOM = 1.05
 """Of the largest error: no bar ends at the frame."""
 
 
-def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
+def ladder_html(name: str, rungs: Sequence[HistoryStep]) -> str:
     """The page; a step on other runs than the one before starts a new series."""
     title = f"{name}: history of its effects"
     if not rungs:
@@ -36,7 +36,7 @@ def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
     )
 
 
-def _rows(rungs: Sequence[Rung], shown: Sequence[str]) -> list[list[str]]:
+def _rows(rungs: Sequence[HistoryStep], shown: Sequence[str]) -> list[list[str]]:
     longest = {o: _longest(rungs, o) for o in shown}
     rows: list[list[str]] = []
     runs: tuple[str, ...] = ()
@@ -67,12 +67,12 @@ def _bars(
     ]
 
 
-def _longest(rungs: Sequence[Rung], output: str) -> float:
+def _longest(rungs: Sequence[HistoryStep], output: str) -> float:
     sizes = [m[output] for rung in rungs for m in (rung.before, rung.after) if output in m]
     return _ROOM * max(sizes)
 
 
-def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
+def ladder_text(name: str, rungs: Sequence[HistoryStep]) -> str:
     """Held-out error per step; a step on other runs than the one before starts a new series."""
     if not rungs:
         return f"{name}: no effect was added or removed"

@@ -21,7 +21,7 @@ from winchkit.report.pages.addition import addition_sections
 from winchkit.report.pages.comparison import comparison_sections
 from winchkit.report.pages.diagnosis import sections
 from winchkit.report.pages.parts import drawings
-from winchkit.report.reproducibility import Command
+from winchkit.report.reproducibility import CommandLine
 from winchkit.report.words.headline import size_texts, worst_outputs
 
 
@@ -38,7 +38,7 @@ def report_html(
     if (by_wing := wings.call("html", answer)) is not None:
         return str(by_wing(answer, title, profile, options=options))
     assert isinstance(answer, WinchAnswer), "of a winch"
-    command = Command(answer.engine.regression.dataset, profile, options)
+    command = CommandLine(answer.engine.regression.dataset, profile, options)
     residuals = residuals_of(answer, command.source)
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
@@ -131,7 +131,7 @@ def comparison_html(
     if (by_wing := wings.call("html", compared)) is not None:
         return str(by_wing(compared, title, profile, options=options))
     assert isinstance(compared, WinchCompared), "of a winch"
-    command = Command(compared.regression.dataset, profile, options)
+    command = CommandLine(compared.regression.dataset, profile, options)
     residuals = residuals_of_comparison(compared, command.source)
     own = residual_figures(residuals)
     drawn, cards = _cards(residuals, size_texts(compared.comparison.outputs), own)
@@ -164,7 +164,7 @@ def addition_html(
     if (by_wing := wings.call("html", fitted)) is not None:
         return str(by_wing(fitted, title, profile, better, options=options))
     assert isinstance(fitted, FittedWinchAddition), "of a winch"
-    command = Command(fitted.regression.dataset, profile, options)
+    command = CommandLine(fitted.regression.dataset, profile, options)
     outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))
     ladder = error_ladder(outputs, extended=True, changed=residuals.changed, source=command.source)

@@ -17,7 +17,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Target
+from winchkit.bench.control.motion import Setpoint
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.tension_control import UsedUp, fastest_within
 from winchkit.schema.bench import LimitSpec
@@ -175,14 +175,14 @@ class CableCorrection:
         """Cable wound in since the start (m) and winding speed (m/s)."""
         return self.correction.at(self._index, time, now)
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Where the correction is at this time."""
         correction = self.correction
         wound, speed = self.at(time, now)
         correction.measured[self._index] = (angle - self._begin) / self._slope
         planned, velocity = self._begin + wound * self._slope, speed * self._slope
         late = planned - velocity * correction.lag - angle
-        return Target(velocity + _GAIN * late, planned, speed, done=correction.ended)
+        return Setpoint(velocity + _GAIN * late, planned, speed, done=correction.ended)
 
     def run_down(self) -> CorrectionRunDown:
         """The stop of all cables in common."""
@@ -218,6 +218,6 @@ class CorrectionRunDown:
         """Order the stop of the correction for all winches."""
         self._motion.correction.end()
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """As before, until it rests."""
         return self._motion.target(time, angle, now)

@@ -11,7 +11,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.tension_control import greatest_stiffness
 from winchkit.bench.host import WinchHost
-from winchkit.bench.tracker import Tracker
+from winchkit.bench.tracker import TrackerReceiver
 from winchkit.bench.winch import Winch
 from winchkit.errors import NotPermitted
 from winchkit.estimation.groups import groups_of
@@ -144,7 +144,7 @@ class Corrections:
                 "under load, a wrong cell, and the mass of the platform in the robot's profile"
             )
 
-    def pose_loop(self, goal: Pose, tracker: Tracker | None, travel: float) -> PoseLoop:
+    def pose_loop(self, goal: Pose, tracker: TrackerReceiver | None, travel: float) -> PoseLoop:
         """The control of the pose by the tracker.
 
         Raises NotPermitted where the tracker's numbers are not known, it shows nothing, or it shows

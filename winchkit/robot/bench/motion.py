@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Target
+from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Setpoint
 from winchkit.robot.bench.correction import CableCorrection
 from winchkit.robot.bench.path_time import PathTime
 
@@ -46,7 +46,7 @@ class CableMotion:
         if self._along and self.trim is not None:
             self.trim.join(time)
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Angle and velocity at the present time along the motion, with the correction."""
         along, rate = self.clock.at(time)
         planned, velocity = self._planned(along)
@@ -63,7 +63,7 @@ class CableMotion:
                 self._trimming = True
                 trim.join(time)
             done = trim.correction.ended or not self._trimming
-        return Target(velocity + GAIN * (planned - angle), planned, velocity * arm, done=done)
+        return Setpoint(velocity + GAIN * (planned - angle), planned, velocity * arm, done=done)
 
     def _settled(self, time: float, missing: float) -> bool:
         """Whether the winch is at the end of the motion, but for ``missing`` (m) of cable."""
@@ -105,6 +105,6 @@ class CableRunDown:
         if self._motion.trim is not None:
             self._motion.trim.correction.end()
 
-    def target(self, time: float, angle: float, now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Setpoint:
         """As along the motion, until it rests."""
         return self._motion.target(time, angle, now)

@@ -50,7 +50,7 @@ class Waypoint:
 
 
 @dataclass(frozen=True)
-class Path:
+class PlatformPath:
     """A smooth path by its length s."""
 
     length: float
@@ -79,7 +79,7 @@ class Path:
         return np.hstack([first[:, :3], turning[0]]), np.hstack([second[:, :3], turning[1]])
 
 
-def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> list[Path]:
+def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> list[PlatformPath]:
     """Smooth paths from a pose through waypoints, each from a stop to the next one.
 
     ``waypoints``: where to go. A corner is blended by a curve of Bézier of degree five with no
@@ -100,7 +100,7 @@ def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> l
     return paths
 
 
-def _path(start: Waypoint, waypoints: Sequence[Waypoint], scale: float) -> Path | None:
+def _path(start: Waypoint, waypoints: Sequence[Waypoint], scale: float) -> PlatformPath | None:
     from scipy.interpolate import CubicSpline
 
     knots = [_point(start, start, scale), *(_point(start, one, scale) for one in waypoints)]
@@ -123,7 +123,7 @@ def _path(start: Waypoint, waypoints: Sequence[Waypoint], scale: float) -> Path 
     curve = CubicSpline(length, points)
     fine = np.linspace(0.0, length[-1], 2 * len(length))
     curvature = float(np.max(np.linalg.norm(curve(fine, 2), axis=1)))
-    return Path(float(length[-1]), curvature, start.rotation, scale, curve)
+    return PlatformPath(float(length[-1]), curvature, start.rotation, scale, curve)
 
 
 def _point(start: Waypoint, one: Waypoint, scale: float) -> Array:

@@ -17,7 +17,7 @@ from winchkit.model.rotation import rotation_vector
 from winchkit.robot.bench.planner import Planner, coordinates_of, moved
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import quadratic
-from winchkit.robot.geometry.forward import AGREEMENT, Found, distance
+from winchkit.robot.geometry.forward import AGREEMENT, PosesFound, distance
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.robot_bench import RobotWiring
@@ -105,14 +105,14 @@ class PlatformPose:
             "LENGTH`"
         )
 
-    def _continues(self, found: Found) -> bool:
+    def _continues(self, found: PosesFound) -> bool:
         """Whether an iteration from the last pose, or from home, ended in the same solution."""
         if self._last is not None:
             return bool(distance(found.pose, self._last)[0] <= _NEAR)
         turned = distance(Pose(self.robot.home.position, found.pose.rotation), self.robot.home)
         return bool(turned[0] <= _UPRIGHT and np.all(np.abs(found.residual[0]) <= AGREEMENT))
 
-    def _require_one(self, found: Found) -> None:
+    def _require_one(self, found: PosesFound) -> None:
         """Raise NotPermitted where the lengths fit a second pose that the cables can hold, too."""
         if not np.isfinite(found.other.position).all() or not self._forces(found.other).any():
             return

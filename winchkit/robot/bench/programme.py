@@ -97,7 +97,7 @@ def run_robot_programme(
         approach = [*planner.plan([there], start, programme.speed, programme.acceleration)]
         first, _ = planned_motions(planner, programme, end)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    execution = _Execution(bench, platform, progress, check)
+    execution = _PlatformExecution(bench, platform, progress, check)
     with stopped_after(bench.stop):
         execution.play(0, approach)
         for repeat, path in enumerate(files, start=1):
@@ -109,7 +109,7 @@ def run_robot_programme(
     return files
 
 
-class _Execution:
+class _PlatformExecution:
     """The motions of a programme, one after another, with the drives enabled between them."""
 
     def __init__(

@@ -26,7 +26,7 @@ import numpy as np
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.bench.lifecycle import stopped_after
-from winchkit.bench.tracker import Tracker, mean_pose
+from winchkit.bench.tracker import TrackerReceiver, mean_pose
 from winchkit.catalog import find
 from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.rotation import angles_of, rotation_of
@@ -102,7 +102,7 @@ class SelfCalibration:
 
 def self_calibrated(
     bench: Bench,
-    tracker: Tracker,
+    tracker: TrackerReceiver,
     *,
     poses: int = 60,
     validation: int = 20,
@@ -120,7 +120,7 @@ def self_calibrated(
     ----------
     bench : Bench
         With a robot at home or anywhere in its workspace; its operator watches.
-    tracker : Tracker
+    tracker : TrackerReceiver
         Receives poses of the platform.
     poses, validation : int
         Number of poses to fit, and of poses that are never fitted.
@@ -158,7 +158,7 @@ def self_calibrated(
         Whatever stops a motion, a quick stop between two of them included; a tracker that sends
         nothing.
     """
-    require_type(tracker, Tracker, "tracker")
+    require_type(tracker, TrackerReceiver, "tracker")
     if poses < 10 or validation < 1:
         raise UsageError(
             f"{poses} poses to fit and {validation} to validate: at least 10 and 1 are needed"
@@ -251,7 +251,7 @@ class _Driver:
     """Moves the platform from pose to pose and measures each at rest."""
 
     def __init__(
-        self, bench: Bench, tracker: Tracker, volume: PoseVolume, compute: Computation
+        self, bench: Bench, tracker: TrackerReceiver, volume: PoseVolume, compute: Computation
     ) -> None:
         self.bench, self.tracker, self.volume = bench, tracker, volume
         self._compute = compute

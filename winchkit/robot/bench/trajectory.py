@@ -9,7 +9,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.trajectory import JERK_TIME, Trajectory, plan
-from winchkit.robot.bench.path import Path
+from winchkit.robot.bench.path import PlatformPath
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import ForceLimits, distributed_forces
@@ -28,7 +28,7 @@ _FEWEST = 16
 class PlatformTrajectory:
     """Samples of a motion from rest to rest along a path; k of them, n cables."""
 
-    path: Path
+    path: PlatformPath
     profile: Trajectory
     """Distance along the path by time."""
     time: Array
@@ -59,7 +59,7 @@ class PlatformTrajectory:
 
 def plan_along(
     robot: Robot,
-    path: Path,
+    path: PlatformPath,
     limits: ForceLimits,
     speed: float,
     acceleration: float,
@@ -106,7 +106,7 @@ def _hanging(
     return replace(motion, pose=pose), np.where((rest.stable & within)[:, None], rest.force, np.nan)
 
 
-def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:
+def motion_at(path: PlatformPath, distance: Array, rate: Array, change: Array) -> PlatformMotion:
     """Motion of the platform at places of a path.
 
     ``distance``, ``rate``, ``change`` (k,): along it, with first and second derivative by time, m,

@@ -30,7 +30,7 @@ from winchkit.errors import RunError, UsageError
 from winchkit.fit_statistics import FitStatistics
 from winchkit.model.drum import drum_of
 from winchkit.rendering import Plotted
-from winchkit.robot.calibration.candidate_effects import Candidate, candidates
+from winchkit.robot.calibration.candidate_effects import CandidateEffect, candidates
 from winchkit.robot.calibration.identifiability import (
     Observability,
     observability,
@@ -41,12 +41,12 @@ from winchkit.robot.calibration.options import Options, ProgressCallback
 from winchkit.robot.calibration.outliers import far_off, gross_errors, left_out_poses, unexplained
 from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
-from winchkit.robot.calibration.selection import Fitted, first_model, fitted_with_instruments
+from winchkit.robot.calibration.selection import FitEnd, first_model, fitted_with_instruments
 from winchkit.robot.calibration.statistics import calibration_statistics
-from winchkit.robot.files.poses import Measured, copies, of_poses
+from winchkit.robot.files.poses import MeasuredPoses, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import declared_instruments
 from winchkit.robot.identification.parameters import (
     EFFECTS,
@@ -81,7 +81,7 @@ _COARSE_RATIO = 5.0
 class Calibrated(Plotted, Tabular):
     """Result of a calibration."""
 
-    equations: Equations
+    equations: RobotEquations
     solution: Solution
     weights: Weights
     estimates: Mapping[str, Estimated]
@@ -90,7 +90,7 @@ class Calibrated(Plotted, Tabular):
     validation_before: PoseErrors
     validation_after: PoseErrors
     observed: Observability
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[CandidateEffect, ...]
     """Effects that would explain a large part of the remaining cost."""
     seconds: float
     warnings: tuple[str, ...]
@@ -204,13 +204,13 @@ def _no_better(what: str, before: float, after: float) -> str:
     )
 
 
-def split(measured: Measured) -> tuple[Measured, Measured]:
+def split(measured: MeasuredPoses) -> tuple[MeasuredPoses, MeasuredPoses]:
     """Split poses into those to fit and every tenth to hold out (none of fewer than ten)."""
     held = np.arange(len(measured)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
     return measured[~held], measured[held]
 
 
-def _unlike(validation: Measured, fit: Measured) -> tuple[Measured, tuple[str, ...]]:
+def _unlike(validation: MeasuredPoses, fit: MeasuredPoses) -> tuple[MeasuredPoses, tuple[str, ...]]:
     """Poses for the held-out error that are not among those to fit, and how many are.
 
     Raises RunError where all are.
@@ -227,8 +227,8 @@ def _unlike(validation: Measured, fit: Measured) -> tuple[Measured, tuple[str, .
 
 def calibrate(
     robot: Robot,
-    fit: Measured,
-    validation: Measured | None = None,
+    fit: MeasuredPoses,
+    validation: MeasuredPoses | None = None,
     options: Options | None = None,
     progress: ProgressCallback = lambda text: None,
 ) -> Calibrated:
@@ -238,9 +238,9 @@ def calibrate(
     ----------
     robot : Robot
         With the nominal values, which are the means of the priors.
-    fit : Measured
+    fit : MeasuredPoses
         Poses to fit, p of n lines.
-    validation : Measured, optional
+    validation : MeasuredPoses, optional
         Poses for the held-out error; by default every tenth of ``fit``, which is then not fitted.
     options : Options, optional
         Effects and known standard deviations.
@@ -260,9 +260,9 @@ def calibrate(
         With the mistakes in the tables of poses (:mod:`winchkit.robot.mistakes`).
     """
     require_type(robot, Robot, "robot")
-    require_type(fit, Measured, "fit")
+    require_type(fit, MeasuredPoses, "fit")
     if validation is not None:
-        require_type(validation, Measured, "validation")
+        require_type(validation, MeasuredPoses, "validation")
     options = options or Options()
     equations = equations_of(robot, fit, options)
     # Before poses are held out, since rows that are shifted have neighbours.
@@ -339,7 +339,7 @@ def calibrate(
     )
 
 
-def equations_of(robot: Robot, measured: Measured, options: Options) -> Equations:
+def equations_of(robot: Robot, measured: MeasuredPoses, options: Options) -> RobotEquations:
     """Constraint equations of measured poses with the parameters of an option's effects.
 
     Raises UsageError where a measurement is missing that an effect needs.
@@ -379,7 +379,7 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
             f"the winches of '{robot.profile.name}' have the layer growths {listed}; the lines of "
             "one robot are calibrated with one, so give them the same cable"
         )
-    return Equations(
+    return RobotEquations(
         robot,
         parameters,
         measured,
@@ -403,7 +403,7 @@ def _estimates(
     return out
 
 
-def _left_out(equations: Equations) -> list[str]:
+def _left_out(equations: RobotEquations) -> list[str]:
     """Effects of the profiles that this model leaves out."""
     robot = equations.robot
     tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
@@ -424,7 +424,7 @@ _OF_TRACKER = {
 }
 
 
-def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
+def _instrument_notes(declared: RobotEquations, chosen: FitEnd) -> list[str]:
     """Numbers of instruments that were fitted, and the datum, in words."""
     before = declared.instruments.free if declared.instruments else frozenset()
     out = []
@@ -457,7 +457,7 @@ def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
     return out
 
 
-def _home_notes(given: Equations, fitted: Equations, values: Array) -> list[str]:
+def _home_notes(given: RobotEquations, fitted: RobotEquations, values: Array) -> list[str]:
     """Cable lengths at home that were fitted although no effect asks for them."""
     index = fitted.parameters.block.get("home_length")
     if index is None or "home_length" in given.parameters.block:
@@ -479,7 +479,7 @@ def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
     ]
 
 
-def _disagreements(equations: Equations, weights: Weights) -> list[str]:
+def _disagreements(equations: RobotEquations, weights: Weights) -> list[str]:
     """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
     exits = equations.parameters.std[equations.parameters.block["exit_point"]]
     prior_std, sigma = float(exits.max()), weights.sigma
@@ -498,7 +498,7 @@ def _disagreements(equations: Equations, weights: Weights) -> list[str]:
 
 
 def _warnings(
-    equations: Equations,
+    equations: RobotEquations,
     solution: Solution,
     weights: Weights,
     observed: Observability,

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from winchkit.robot.identification.bundle_adjustment import (
+    BundleState,
     Solution,
-    State,
     Weights,
     linearise,
 )
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.parameters import EFFECTS, LAWS, parameters_of
 
 _LEAST_SHARE = 0.2
@@ -30,7 +30,7 @@ _EQUAL_SHARES = 0.1
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateEffect:
     """Candidate effect: one that is not in the model."""
 
     effect: str
@@ -39,8 +39,8 @@ class Candidate:
 
 
 def candidates(
-    equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
-) -> tuple[Candidate, ...]:
+    equations: RobotEquations, solution: Solution, weights: Weights, effects: tuple[str, ...]
+) -> tuple[CandidateEffect, ...]:
     """Effects that would explain much of the remaining cost, the largest share first."""
     out = []
     for effect in EFFECTS:
@@ -52,7 +52,7 @@ def candidates(
         if not gain > _LEAST_GAIN:
             continue
         if (share := gain / max(solution.linear.cost, gain)) > _LEAST_SHARE:
-            out.append(Candidate(effect, share))
+            out.append(CandidateEffect(effect, share))
     laws = [c for c in out if c.effect in LAWS]
     if laws:
         best = max(c.share for c in laws)
@@ -62,7 +62,7 @@ def candidates(
     return tuple(sorted(out, key=lambda c: -c.share))
 
 
-def _possible(equations: Equations, effect: str) -> bool:
+def _possible(equations: RobotEquations, effect: str) -> bool:
     """Whether an effect has the forces that it needs, and excludes no effect of the fit."""
     if effect not in LAWS:
         return "home_length" not in equations.parameters.block
@@ -71,7 +71,7 @@ def _possible(equations: Equations, effect: str) -> bool:
 
 
 def _gain(
-    equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
+    equations: RobotEquations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> float:
     """Fall of the cost in one linearised step with the effect's parameters free."""
     own = equations.parameters
@@ -80,7 +80,7 @@ def _gain(
     free = own.carried(solution.held, wider, np.zeros(len(values))) == 0
     # Their priors are those that the fit started with.
     wider = wider.about(own.carried(own.nominal, wider, wider.nominal))
-    state = State(values, solution.state.pose)
+    state = BundleState(values, solution.state.pose)
     linear = linearise(replace(equations, parameters=wider), state, weights)
     matrix = linear.information[np.ix_(free, free)] + np.eye(int(np.count_nonzero(free)))
     gradient = linear.gradient[free]

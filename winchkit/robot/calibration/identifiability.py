@@ -17,13 +17,13 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_vector, skew
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.identification.bundle_adjustment import (
-    Linear,
+    BundleState,
+    ReducedEquations,
     Solution,
-    State,
     Weights,
     linearise,
 )
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.parameters import Parameters
 
 _LEAST_EIGENVALUE = 1e-11
@@ -59,7 +59,7 @@ class Observability:
         return len(self.information)
 
 
-def observability(equations: Equations, solution: Solution, weights: Weights) -> Observability:
+def observability(equations: RobotEquations, solution: Solution, weights: Weights) -> Observability:
     """Rank, posterior and unidentifiable directions at the end of a fit."""
     scale = equations.parameters.std
     data = solution.linear.information
@@ -81,7 +81,9 @@ def observability(equations: Equations, solution: Solution, weights: Weights) ->
     )
 
 
-def _significant_information(equations: Equations, solution: Solution, weights: Weights) -> Array:
+def _significant_information(
+    equations: RobotEquations, solution: Solution, weights: Weights
+) -> Array:
     """Information at poses whose rotations are replaced by their significant part.
 
     A platform that never turned seems to turn by the noise of its estimated poses, which would
@@ -101,7 +103,7 @@ def _significant_information(equations: Equations, solution: Solution, weights: 
     if not np.all(is_significant):
         kept = axes * is_significant
         significant = Pose(pose.position, rotation_by(turned @ kept @ kept.T) @ mean_or_home)
-        state = State(solution.state.values, significant)
+        state = BundleState(solution.state.values, significant)
         data = linearise(equations, state, weights).information
     zeros = equations.parameters.free & ~equations.parameters.lasting
     if not np.any(zeros):
@@ -110,7 +112,7 @@ def _significant_information(equations: Equations, solution: Solution, weights: 
     return np.asarray(data - coupled @ np.linalg.solve(data[np.ix_(zeros, zeros)], coupled.T))
 
 
-def _rotation_noise(linear: Linear) -> Array:
+def _rotation_noise(linear: ReducedEquations) -> Array:
     """Mean covariance of the poses' rotations, with that of the parameters, (3, 3)."""
     inverse = np.swapaxes(linear.factor, 1, 2) @ linear.factor
     coupled = np.swapaxes(linear.stack.by_pose, 1, 2) @ linear.stack.by_values
@@ -121,7 +123,9 @@ def _rotation_noise(linear: Linear) -> Array:
     return np.asarray(np.mean(inverse[:, 3:, 3:] + spread, axis=0))
 
 
-def _words(equations: Equations, data: Array, unidentifiable: Array, floor: float) -> Iterator[str]:
+def _words(
+    equations: RobotEquations, data: Array, unidentifiable: Array, floor: float
+) -> Iterator[str]:
     """Directions with a known reason first, then the others by their largest parameters."""
     if not unidentifiable.shape[1]:
         return
@@ -153,7 +157,7 @@ def _complement(explained: Array, directions: Array) -> Array:
     return np.asarray(left[:, size > _LEAST_COMPLEMENT])
 
 
-def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
+def _reasons(equations: RobotEquations) -> Iterator[tuple[str, list[Array]]]:
     """Directions in scaled parameters that are not identifiable for a known reason."""
     home, lines = equations.robot.home, len(equations.robot.names)
     turn = home.rotation[0]
@@ -194,7 +198,7 @@ def _reasons(equations: Equations) -> Iterator[tuple[str, list[Array]]]:
         )
 
 
-def _scaled(equations: Equations, shift: dict[str, Array]) -> Array:
+def _scaled(equations: RobotEquations, shift: dict[str, Array]) -> Array:
     """Shift of blocks of parameters in standard deviations of their priors, (q,)."""
     scale = equations.parameters.std
     out = np.zeros(len(scale))
@@ -215,7 +219,7 @@ _REACH = 2.0
 twice that distance are in another unit or frame."""
 
 
-def refuse_unfit(equations: Equations) -> None:
+def refuse_unfit(equations: RobotEquations) -> None:
     """Raise UsageError for poses that are too few, too many, without redundancy or out of reach."""
     measured, many = equations.measured, len(equations.measured)
     known = equations.count
@@ -237,7 +241,7 @@ def refuse_unfit(equations: Equations) -> None:
         )
 
 
-def _refuse_out_of_reach(equations: Equations) -> None:
+def _refuse_out_of_reach(equations: RobotEquations) -> None:
     """Refuse positions that a robot of this size cannot reach: wrong unit or frame."""
     if equations.instruments is not None and "frame" in equations.instruments.free:
         return
@@ -254,7 +258,7 @@ def _refuse_out_of_reach(equations: Equations) -> None:
         )
 
 
-def _refuse_other_motions(equations: Equations) -> None:
+def _refuse_other_motions(equations: RobotEquations) -> None:
     """Refuse positions that the declared degrees of freedom do not permit, and cables in a plane
     of a platform that is said to move in space."""
     robot = equations.robot

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.identification.bundle_adjustment import (
+    BundleState,
     Solution,
-    State,
     Weights,
     linearise,
     place,
     solve,
 )
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.variance_components import NOISE
 
 _LIMIT = 10.0
@@ -41,7 +41,7 @@ _CAUSES = {
 }
 
 
-def gross_errors(equations: Equations, values: Array, weights: Weights) -> NDArray[np.bool_]:
+def gross_errors(equations: RobotEquations, values: Array, weights: Weights) -> NDArray[np.bool_]:
     """Poses with a reading far from what the others predict, (p,).
 
     ``values`` (q,), ``weights``: of a fit to which wrong poses may have contributed. More than a
@@ -59,7 +59,7 @@ def gross_errors(equations: Equations, values: Array, weights: Weights) -> NDArr
     ----------
     P. J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
     """
-    state = place(equations, State(values, equations.start(values)), weights)
+    state = place(equations, BundleState(values, equations.start(values)), weights)
     weights = _robust_weights(equations, state)
     state = place(equations, state, weights)
     information = linearise(equations, state, weights).information
@@ -70,8 +70,8 @@ def gross_errors(equations: Equations, values: Array, weights: Weights) -> NDArr
         if np.array_equal(before, kept):
             break
         pose = Pose(state.pose.position[kept], state.pose.rotation[kept])
-        fit = solve(equations.of(kept), State(state.values, pose), weights)
-        state = place(equations, State(fit.state.values, state.pose), weights)
+        fit = solve(equations.of(kept), BundleState(state.values, pose), weights)
+        state = place(equations, BundleState(fit.state.values, state.pose), weights)
         weights = _robust_weights(equations, state)
         state = place(equations, state, weights)
         misfit = _misfit(equations, state, weights, fit.linear.information)
@@ -100,7 +100,7 @@ def left_out_poses(places: NDArray[np.str_], of: str) -> list[str]:
     ]
 
 
-def _robust_weights(equations: Equations, state: State) -> Weights:
+def _robust_weights(equations: RobotEquations, state: BundleState) -> Weights:
     """Standard deviations by the median absolute residual of each kind."""
     sigma = {}
     for kind, constraint in equations.constraints(state):
@@ -111,7 +111,9 @@ def _robust_weights(equations: Equations, state: State) -> Weights:
     return Weights(sigma)
 
 
-def _misfit(equations: Equations, state: State, weights: Weights, information: Array) -> Array:
+def _misfit(
+    equations: RobotEquations, state: BundleState, weights: Weights, information: Array
+) -> Array:
     """Misfit of each pose, (p,), with parameters known as of an information matrix."""
     linear = linearise(equations, state, weights)
     free, residual = linear.pose_free, linear.stack.residual
@@ -121,7 +123,7 @@ def _misfit(equations: Equations, state: State, weights: Weights, information: A
     return np.asarray(np.sqrt(square / np.maximum(linear.stack.known.sum(axis=1), 1)))
 
 
-def unexplained(equations: Equations, solution: Solution) -> list[str]:
+def unexplained(equations: RobotEquations, solution: Solution) -> list[str]:
     """One sentence per kind of instrument at the lines that does not show the predicted motion.
 
     Notes

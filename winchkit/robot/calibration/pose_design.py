@@ -13,7 +13,7 @@ from winchkit.robot.calibration.calibrate import Calibrated
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose, lengths
 from winchkit.robot.geometry.robot import robot_of
-from winchkit.robot.identification.bundle_adjustment import State, linearise
+from winchkit.robot.identification.bundle_adjustment import BundleState, linearise
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
     determinant_gain,
@@ -121,4 +121,4 @@ def _information(found: Calibrated, pose: Pose) -> Array:
     mean = np.tile(total / np.maximum(known.sum(axis=0), 1), (len(pose.position), 1))
     robot = robot_of(equations.profile_at(found.values))
     there = replace(equations, measured=simulated(equations.measured, robot, pose, mean))
-    return linearise(there, State(found.values, pose), found.weights).pose_free
+    return linearise(there, BundleState(found.values, pose), found.weights).pose_free

@@ -14,8 +14,8 @@ from winchkit.robot.files.poses import held_unmeasured
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import reading_of, registered
-from winchkit.robot.identification.bundle_adjustment import State, Weights, place
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, place
+from winchkit.robot.identification.equations import RobotEquations
 
 _ROUNDS = 4
 """Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
@@ -40,7 +40,9 @@ class PoseErrors:
     """Number of poses for which the forward kinematics did not converge."""
 
 
-def errors_at(equations: Equations, values: Array, predicted: Pose | None = None) -> PoseErrors:
+def errors_at(
+    equations: RobotEquations, values: Array, predicted: Pose | None = None
+) -> PoseErrors:
     """Predict every pose from its motor angles, and compare it with the measured one.
 
     ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
@@ -60,7 +62,7 @@ def errors_at(equations: Equations, values: Array, predicted: Pose | None = None
     return PoseErrors(distance, angle, vector, measured.position, measured.place, unfound)
 
 
-def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array:
+def cable_errors(equations: RobotEquations, values: Array, weights: Weights) -> Array:
     """Cable lengths by drums against geometry, at the poses that all instruments determine.
 
     The held-out error of a robot whose positions are not measured.
@@ -70,11 +72,11 @@ def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array
     """
     # Kinds that were not fitted have unknown zeros and take no part.
     sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
-    state = place(equations, State(values, equations.start(values)), Weights(sigma))
+    state = place(equations, BundleState(values, equations.start(values)), Weights(sigma))
     return next(c.residual for kind, c in equations.constraints(state) if kind == "closure")
 
 
-def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:
+def predicted_poses(equations: RobotEquations, values: Array, start: Pose | None = None) -> Pose:
     """Forward kinematics of the motor angles, with strains by fixed-point iteration.
 
     ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
@@ -97,7 +99,7 @@ def predicted_poses(equations: Equations, values: Array, start: Pose | None = No
     return found.pose
 
 
-def _reading(equations: Equations, values: Array, pose: Pose) -> Pose:
+def _reading(equations: RobotEquations, values: Array, pose: Pose) -> Pose:
     """Indications of the tracker at poses.
 
     A session that was not fitted has an unknown frame, which is registered on its own poses.
@@ -119,7 +121,7 @@ def _reading(equations: Equations, values: Array, pose: Pose) -> Pose:
     return reading_of(tracker, pose)
 
 
-def _known(equations: Equations) -> NDArray[np.bool_]:
+def _known(equations: RobotEquations) -> NDArray[np.bool_]:
     return np.asarray(np.all(np.isfinite(equations.measured.motor_angle), axis=1))
 
 
@@ -129,7 +131,7 @@ def rms(values: Sequence[float] | Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
-def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
+def _where(good: NDArray[np.bool_], pose: Pose, equations: RobotEquations) -> Pose:
     home = equations.robot.home
     return Pose(
         np.where(good[:, None], pose.position, home.position),

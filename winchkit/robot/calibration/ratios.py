@@ -30,7 +30,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.robot.identification.bundle_adjustment import Solution
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 
 _PENALTY = 25.0
 """χ² that a line must explain to be named: five standard deviations."""
@@ -55,7 +55,7 @@ _MOST_LINES = 8
 
 
 @dataclass(frozen=True)
-class Ratio:
+class CableRatio:
     """Cable per motor turn of one line against its profile."""
 
     line: str
@@ -70,7 +70,7 @@ class Ratio:
 class Ratios:
     """Cable per motor turn of all lines."""
 
-    lines: tuple[Ratio, ...]
+    lines: tuple[CableRatio, ...]
     alternatives: tuple[tuple[str, ...], ...] = ()
     """Other sets of lines that explain the same."""
 
@@ -101,7 +101,7 @@ def _listed(lines: Sequence[str]) -> str:
     return f"line{'s' if len(lines) > 1 else ''} {', '.join(lines)}"
 
 
-def ratios_of(equations: Equations, solution: Solution) -> Ratios:
+def ratios_of(equations: RobotEquations, solution: Solution) -> Ratios:
     """Cable per motor turn of each line at the end of a fit."""
     parameters, names = equations.parameters, equations.robot.names
     values, scale = solution.state.values, parameters.std
@@ -125,7 +125,7 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
         if i in chosen and right:
             weight[right] -= 1.0 / len(right)
         lines.append(
-            Ratio(
+            CableRatio(
                 name,
                 float(weight @ change),
                 float(np.sqrt(max(weight @ covariance @ weight, 0.0))),
@@ -135,13 +135,13 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
     return Ratios(tuple(lines), tuple(tuple(names[i] for i in each) for each in others))
 
 
-def _stated(equations: Equations) -> Array:
+def _stated(equations: RobotEquations) -> Array:
     """Standard deviations of the winding radii that the file states, as shares, (n,)."""
     at = equations.parameters.block["winding_radius"]
     return np.asarray(equations.parameters.std[at] / equations.parameters.nominal[at])
 
 
-def _wound(equations: Equations, values: Array) -> tuple[Array, Array]:
+def _wound(equations: RobotEquations, values: Array) -> tuple[Array, Array]:
     """Cable wound since home (p, n) and its derivatives (p, n, q)."""
     known = np.isfinite(equations.measured.motor_angle)
     block, lines = equations.parameters.block, np.arange(known.shape[1])

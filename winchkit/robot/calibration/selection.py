@@ -37,17 +37,17 @@ from winchkit.robot.calibration.ratios import ratios_of
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import Tracker
 from winchkit.robot.identification.bundle_adjustment import (
+    BundleState,
     Solution,
-    State,
     Weights,
     linearise,
     solve,
 )
-from winchkit.robot.identification.equations import Equations, started
+from winchkit.robot.identification.equations import RobotEquations, started
 from winchkit.robot.identification.instruments import (
     LARGEST_SCALE,
     OF_LINES,
-    Instruments,
+    InstrumentValues,
     declared_instruments,
     registered_instruments,
 )
@@ -97,10 +97,10 @@ points' prior."""
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FitEnd:
     """End of a fit."""
 
-    equations: Equations
+    equations: RobotEquations
     solution: Solution
     weights: Weights
 
@@ -165,8 +165,8 @@ class Fitted:
 
 
 def fitted_with_instruments(
-    equations: Equations, options: Options, progress: ProgressCallback
-) -> tuple[Equations, Fitted]:
+    equations: RobotEquations, options: Options, progress: ProgressCallback
+) -> tuple[RobotEquations, FitEnd]:
     """Fit the declared model, or the one with the instruments and ratios that the poses require.
 
     ``progress``: called with a line of progress. Returns: ``declared``: declared model at the
@@ -181,7 +181,7 @@ def fitted_with_instruments(
     return declared, _with_ratios(best, options, progress)
 
 
-def first_model(equations: Equations, options: Options) -> tuple[Equations, Weights]:
+def first_model(equations: RobotEquations, options: Options) -> tuple[RobotEquations, Weights]:
     """The declared model at the values from which its fit starts, and its standard deviations."""
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
     declared = _declared(equations, predicted)
@@ -189,15 +189,15 @@ def first_model(equations: Equations, options: Options) -> tuple[Equations, Weig
     return started(declared, sigma)[0], Weights(sigma)
 
 
-def _declared(equations: Equations, predicted: Pose) -> Equations:
+def _declared(equations: RobotEquations, predicted: Pose) -> RobotEquations:
     """The model that the file declares, its tracker registered."""
     own = _instruments(equations)
     return _registered(equations, own, own.free, predicted) if own.free else equations
 
 
 def _with_home(
-    equations: Equations, best: Fitted, options: Options, progress: ProgressCallback
-) -> tuple[Equations, Fitted] | None:
+    equations: RobotEquations, best: FitEnd, options: Options, progress: ProgressCallback
+) -> tuple[RobotEquations, FitEnd] | None:
     """The fit with the cable lengths at home free, where it explains the poses clearly better.
 
     It is tried before a tracker is blamed that the file does not declare unknown, and where cables
@@ -219,8 +219,8 @@ def _with_home(
 
 
 def _fitted_with_tracker(
-    equations: Equations, options: Options, progress: ProgressCallback
-) -> tuple[Equations, Fitted]:
+    equations: RobotEquations, options: Options, progress: ProgressCallback
+) -> tuple[RobotEquations, FitEnd]:
     """Fit the declared model, or the one with the tracker that the poses require."""
     own = _instruments(equations)
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
@@ -239,7 +239,7 @@ def _fitted_with_tracker(
     least = np.nanmin(errors) if np.any(np.isfinite(errors)) else 0.0
     limit = max(_CLEARLY_WORSE * float(least), _LEAST_MISFIT)
 
-    def is_near(trial: Equations) -> bool:
+    def is_near(trial: RobotEquations) -> bool:
         return not _nominal_error(trial, predicted) > limit
 
     first = None
@@ -271,7 +271,7 @@ def _fitted_with_tracker(
     return declared, best if best is first else _mounted(best, predicted, options, progress)
 
 
-def _starting_at_home(equations: Equations, own: Instruments) -> Equations:
+def _starting_at_home(equations: RobotEquations, own: InstrumentValues) -> RobotEquations:
     """The equations with lengths at home by an adjustment, where the tracker's frame is known and
     they are beyond their prior."""
     if "frame" in own.free:
@@ -284,7 +284,7 @@ def _starting_at_home(equations: Equations, own: Instruments) -> Equations:
     return replace(equations, parameters=equations.parameters.starting("home_length", found))
 
 
-def _recentred(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+def _recentred(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
     """The fit with the priors of the lengths at home about their estimates, where these left them.
 
     A prior for a platform in its fixture says nothing of one that stood elsewhere.
@@ -299,7 +299,7 @@ def _recentred(best: Fitted, options: Options, progress: ProgressCallback) -> Fi
     return best
 
 
-def _with_more(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+def _with_more(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
     """The fit with more numbers of instruments free, while the poses require one of them."""
     while True:
         own = _instruments(best.equations)
@@ -314,7 +314,7 @@ def _with_more(best: Fitted, options: Options, progress: ProgressCallback) -> Fi
         best = min(fits, key=lambda fit: fit.criterion)
 
 
-def _undeclared(equations: Equations, own: Instruments) -> list[str]:
+def _undeclared(equations: RobotEquations, own: InstrumentValues) -> list[str]:
     """Numbers of instruments other than a tracker that may be free beside those that are."""
     kinds = equations.kinds
     possible = {
@@ -325,7 +325,7 @@ def _undeclared(equations: Equations, own: Instruments) -> list[str]:
     return [name for name, may in possible.items() if may and name not in own.free]
 
 
-def _with_ratios(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+def _with_ratios(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
     """The fit with the gear ratios of the lines whose winding radius left its prior.
 
     A drum with layers distinguishes its ratio from its radius, so that the radius alone would be a
@@ -345,7 +345,7 @@ def _with_ratios(best: Fitted, options: Options, progress: ProgressCallback) -> 
     return found if found.with_prior < best.with_prior else best
 
 
-def _instruments(equations: Equations) -> Instruments:
+def _instruments(equations: RobotEquations) -> InstrumentValues:
     if equations.instruments is not None:
         return equations.instruments
     return declared_instruments(equations.robot, equations.measured)
@@ -357,8 +357,8 @@ def _left(free: frozenset[str]) -> list[str]:
 
 
 def _variants(
-    equations: Equations, own: Instruments, free: frozenset[str], predicted: Pose
-) -> list[Equations]:
+    equations: RobotEquations, own: InstrumentValues, free: frozenset[str], predicted: Pose
+) -> list[RobotEquations]:
     """Rotations in the tracker's frame, and in that of an IMU, unless it is plain which."""
     found = _registered(equations, own, free, predicted)
     used = found.instruments
@@ -374,31 +374,31 @@ def _variants(
     return [trial for trial, error in zip(both, plain, strict=True) if error <= _PLAINLY * least]
 
 
-def _first_tracker(equations: Equations) -> Tracker:
+def _first_tracker(equations: RobotEquations) -> Tracker:
     assert equations.instruments is not None
     return equations.instruments.trackers[0]
 
 
 def _registered(
-    equations: Equations, own: Instruments, free: frozenset[str], predicted: Pose
-) -> Equations:
+    equations: RobotEquations, own: InstrumentValues, free: frozenset[str], predicted: Pose
+) -> RobotEquations:
     """Equations with these numbers free, at the values of the registration."""
     imu = equations.robot.profile.instrument.imu is not None
     instruments = registered_instruments(own, free, predicted, equations.measured, imu=imu)
     return with_instruments(equations, instruments)
 
 
-def with_instruments(equations: Equations, instruments: Instruments) -> Equations:
+def with_instruments(equations: RobotEquations, instruments: InstrumentValues) -> RobotEquations:
     """The equations with other instruments; the other parameters start as they do."""
     wider = parameters_of(equations.robot, equations.measured, equations.effects, instruments)
     return replace(equations, parameters=wider, instruments=instruments)
 
 
-def _nominal_error(equations: Equations, predicted: Pose) -> float:
+def _nominal_error(equations: RobotEquations, predicted: Pose) -> float:
     return rms(errors_at(equations, equations.parameters.nominal, predicted).distance)
 
 
-def _shows_more(first: Fitted, wider: Equations) -> bool:
+def _shows_more(first: FitEnd, wider: RobotEquations) -> bool:
     """Score test: whether one more free part of the tracker explains a significant part of χ².
 
     The equations are linearised at the end of the fit with these numbers beside the parameters. The
@@ -417,7 +417,7 @@ def _shows_more(first: Fitted, wider: Equations) -> bool:
     before, wide, state = first.equations.parameters, trial.parameters, first.solution.state
     values = before.carried(state.values, wide, wide.nominal)
     left = before.carried(first.solution.held, wide, np.zeros(len(values))) == 0
-    linear = linearise(trial, State(values, state.pose), first.weights)
+    linear = linearise(trial, BundleState(values, state.pose), first.weights)
     gradient, prior = linear.gradient[left], linear.prior[left]
     matrix = linear.information[np.ix_(left, left)] + np.eye(len(gradient))
     step = -np.linalg.solve(matrix, gradient)
@@ -425,7 +425,7 @@ def _shows_more(first: Fitted, wider: Equations) -> bool:
     return not fall < chdtri(len(wide) - len(before), _LEVEL)
 
 
-def _mounted(best: Fitted, predicted: Pose, options: Options, progress: ProgressCallback) -> Fitted:
+def _mounted(best: FitEnd, predicted: Pose, options: Options, progress: ProgressCallback) -> FitEnd:
     """The fit with the target's axes free, where the measured rotations require it."""
     own = best.equations.instruments
     if own is None or "rotation" not in best.equations.kinds or "mounting" in own.free:
@@ -438,11 +438,11 @@ def _mounted(best: Fitted, predicted: Pose, options: Options, progress: Progress
 
 
 def _fitted(
-    equations: Equations,
+    equations: RobotEquations,
     options: Options,
     progress: ProgressCallback,
-    from_fit: Fitted | None = None,
-) -> Fitted:
+    from_fit: FitEnd | None = None,
+) -> FitEnd:
     """Fit and variance components in turn until both have settled.
 
     A model that contains another one starts at the fit of that, so that it fits at least as well.
@@ -461,18 +461,18 @@ def _fitted(
             break
         weights = found
         solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))
-    return Fitted(equations, solution, weights)
+    return FitEnd(equations, solution, weights)
 
 
-def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
+def _continued(equations: RobotEquations, fitted: FitEnd) -> tuple[RobotEquations, BundleState]:
     """Equations with the priors of a fit of fewer parameters, and its end as their state."""
     wider, own, end = equations.parameters, fitted.equations.parameters, fitted.solution.state
     wider = wider.about(own.carried(own.nominal, wider, wider.nominal))
     values = own.carried(end.values, wider, wider.nominal)
-    return replace(equations, parameters=wider), State(values, end.pose)
+    return replace(equations, parameters=wider), BundleState(values, end.pose)
 
 
-def _sigma(equations: Equations, options: Options) -> dict[str, float]:
+def _sigma(equations: RobotEquations, options: Options) -> dict[str, float]:
     given = options.sigma or {}
     return {kind: given.get(kind, NOISE[kind].start) for kind in equations.kinds}
 

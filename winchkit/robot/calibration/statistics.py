@@ -13,7 +13,7 @@ import numpy as np
 
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
 from winchkit.robot.identification.bundle_adjustment import Solution
-from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.parameters import Estimated
 
 _95 = 1.959964
@@ -21,7 +21,7 @@ _95 = 1.959964
 
 
 def calibration_statistics(
-    equations: Equations,
+    equations: RobotEquations,
     solution: Solution,
     estimates: Mapping[str, Estimated],
 ) -> FitStatistics:

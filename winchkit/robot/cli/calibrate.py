@@ -13,7 +13,7 @@ from winchkit.cli.core.completion import complete_bench, complete_effect, comple
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     ManyValues,
@@ -91,7 +91,7 @@ _NOISE_DIMENSIONS = {
 @click.option(
     "--box",
     metavar="LENGTH",
-    type=Quantity("length", example="75 mm"),
+    type=QuantityType("length", example="75 mm"),
     default="75 mm",
     show_default=True,
     help="Half width of the volume about home.",
@@ -99,7 +99,7 @@ _NOISE_DIMENSIONS = {
 @click.option(
     "--turn",
     metavar="ANGLE",
-    type=Quantity("angle", example="7.5 deg"),
+    type=QuantityType("angle", example="7.5 deg"),
     default="7.5 deg",
     show_default=True,
     help="Largest rotation from home.",
@@ -107,7 +107,7 @@ _NOISE_DIMENSIONS = {
 @click.option(
     "--accuracy",
     metavar="LENGTH",
-    type=Quantity("length", example="1 mm"),
+    type=QuantityType("length", example="1 mm"),
     help="Add poses until the error is below this.",
 )
 @click.option(
@@ -134,7 +134,7 @@ _NOISE_DIMENSIONS = {
 @click.option(
     "--middle-force",
     metavar="FORCE",
-    type=Quantity("force", example="80 N"),
+    type=QuantityType("force", example="80 N"),
     help="Cable force kept near, where not measured.",
 )
 @click.option(

@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.bench.holding import hold_on
 from winchkit.cli.bench.pose_option import read_pose
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -18,7 +18,7 @@ from winchkit.cli.core.options import (
     take_over_option,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import MotionError
 from winchkit.schema.programme import ALL
 
@@ -28,7 +28,7 @@ _REHEARSED = 1.0
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         Example("winchkit hold-platform --preload 600N --for 5s -b robot.toml", _NEEDS_ROBOT),
         Example("winchkit hold-platform --pose x=0.1m -b robot.toml", _NEEDS_ROBOT),
@@ -45,13 +45,13 @@ _REHEARSED = 1.0
     "--for",
     "duration",
     metavar="TIME",
-    type=Quantity("time", example="5 s"),
+    type=QuantityType("time", example="5 s"),
     help="Stop after this time.  [default: until Ctrl-C]",
 )
 @click.option(
     "--travel",
     metavar="LENGTH",
-    type=Quantity("length", example="10 mm"),
+    type=QuantityType("length", example="10 mm"),
     default="10 mm",
     show_default=True,
     help="Of each cable either way from its place at the start; the bench trips where it is used "
@@ -60,7 +60,7 @@ _REHEARSED = 1.0
 @click.option(
     "--speed",
     metavar="SPEED",
-    type=Quantity("speed", example="50 mm/s"),
+    type=QuantityType("speed", example="50 mm/s"),
     default="50 mm/s",
     show_default=True,
     help="Largest speed of a cable.",
@@ -68,7 +68,7 @@ _REHEARSED = 1.0
 @click.option(
     "--axial-stiffness",
     metavar="FORCE",
-    type=Quantity("force", example="200 kN"),
+    type=QuantityType("force", example="200 kN"),
     help="Of the cables, EA.  [default: by the profile]",
 )
 @take_over_option

@@ -7,26 +7,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_bench
 from winchkit.cli.core.options import PROFILE, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.robot.geometry.robot import Robot
-    from winchkit.robot.workspace.workspace import Demand, Grid, Workspace
+    from winchkit.robot.workspace.workspace import CableDemand, Grid, Workspace
 
-_FORCE = Quantity("force", example="20 N")
-_SPEED = Quantity("speed", example="0.3 m/s")
+_FORCE = QuantityType("force", example="20 N")
+_SPEED = QuantityType("speed", example="0.3 m/s")
 _PLACE = "x=-1m,y=-1m,z=0m"
 _SLICES = 12
 """Rows of the table of areas: a screen; the file has every cell."""
 
 
 @click.command(
-    cls=Command,
+    cls=ToolCommand,
     examples=(
         "winchkit workspace cabtive --tension '5 N' '80 N'",
         "winchkit workspace cabtive --tension '5 N' '80 N' --turn '10 deg' -o cabtive.ply",
@@ -46,24 +46,24 @@ _SLICES = 12
 @click.option("--force", type=_FORCE, help="Further force on the platform, in any direction.")
 @click.option(
     "--moment",
-    type=Quantity("torque", example="2 N m"),
+    type=QuantityType("torque", example="2 N m"),
     help="Further moment about its origin, in any direction.",
 )
 @click.option("--cable-speed", type=_SPEED, help="Limit of the speed of every cable.")
 @click.option("--speed", type=_SPEED, help="Speed of the platform, in any direction.")
 @click.option(
     "--rotation-speed",
-    type=Quantity("angular speed", example="20 deg/s"),
+    type=QuantityType("angular speed", example="20 deg/s"),
     help="Speed of its rotation, about any axis.",
 )
 @click.option(
     "--turn",
-    type=Quantity("angle", example="10 deg"),
+    type=QuantityType("angle", example="10 deg"),
     help="Ask also for rotations by this about each axis, both ways.",
 )
 @click.option(
     "--step",
-    type=Quantity("length", example="50 mm"),
+    type=QuantityType("length", example="50 mm"),
     help="Edge of a cell.  [default: a fortieth of the box]",
 )
 @click.option("--from", "start", metavar="PLACE", help=f"Lowest corner of the box, {_PLACE}.")
@@ -128,7 +128,9 @@ def command(
         _write(found, chosen, Path(output))
 
 
-def _demanded(robot: str | None, bench: str | None, given: dict[str, Any]) -> tuple[Robot, Demand]:
+def _demanded(
+    robot: str | None, bench: str | None, given: dict[str, Any]
+) -> tuple[Robot, CableDemand]:
     """The robot and what is asked of it: options before the bench file's numbers."""
     import numpy as np
 
@@ -136,7 +138,7 @@ def _demanded(robot: str | None, bench: str | None, given: dict[str, Any]) -> tu
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.robot.effects.bind import robot_with_effects
     from winchkit.robot.forces.force_distribution import ForceLimits
-    from winchkit.robot.workspace.workspace import Demand
+    from winchkit.robot.workspace.workspace import CableDemand
     from winchkit.schema.read import read_bench, read_robot
 
     if (robot is None) == (bench is None):
@@ -165,7 +167,7 @@ def _demanded(robot: str | None, bench: str | None, given: dict[str, Any]) -> tu
     given["tension"] = ForceLimits(*given["tension"])
     if "cable_speed" in given:
         given["cable_speed"] = np.broadcast_to(given["cable_speed"], (len(model.names),))
-    return model, Demand(**given)
+    return model, CableDemand(**given)
 
 
 def _box(robot: Robot, start: str | None, end: str | None) -> Any:
@@ -212,7 +214,7 @@ def _figures(found: Workspace) -> dict[str, Any]:
     }
 
 
-def _text(robot: Robot, found: Workspace, demand: Demand) -> str:
+def _text(robot: Robot, found: Workspace, demand: CableDemand) -> str:
     """Volumes of all conditions, and areas at some heights."""
     grid = found.grid
     poses = len(grid.positions) * len(grid.rotation)
@@ -237,7 +239,7 @@ def _text(robot: Robot, found: Workspace, demand: Demand) -> str:
     return "\n".join(lines)
 
 
-def _asked(name: str, demand: Demand) -> str:
+def _asked(name: str, demand: CableDemand) -> str:
     from math import degrees
 
     if name == "wrench-feasible" and demand.tension is not None:

@@ -10,7 +10,7 @@ from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import Addition, FittedAddition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -105,7 +105,7 @@ def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
 
 
 def _outputs_and_values(
-    preparation: Preparation, engine: PoseSelection, first: Fit, final: Fit, noise: Noise
+    preparation: Preparation, engine: PoseSelection, first: Fit, final: Fit, noise: BandNoise
 ) -> tuple[dict[str, OutputFit], list[tuple[Term, dict[str, Estimate]]]]:
     """Errors of every output before and after, and the effects with their estimates."""
     regression = engine.regression

@@ -22,8 +22,8 @@ from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of
-from winchkit.robot.identification.bundle_adjustment import State, Weights, solve
-from winchkit.robot.identification.equations import Equations, placed, started
+from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, solve
+from winchkit.robot.identification.equations import RobotEquations, placed, started
 from winchkit.robot.identification.parameters import Parameters, parameters_of
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.units import parse
@@ -54,9 +54,9 @@ class LinearizationPoint:
     """Parameters and poses at which a regression is linearised."""
 
     dataset: RobotDataset
-    equations: Equations
+    equations: RobotEquations
     """Without effects; free numbers of the geometry are nuisance parameters."""
-    state: State
+    state: BundleState
     sigma: Mapping[str, float]
     """Standard deviation per type of measurement, SI."""
     instruments: tuple[Term, ...] = ()
@@ -116,12 +116,12 @@ def geometry_parameters(
     return replace(parameters, all=tuple(everything))
 
 
-def equations_of(dataset: RobotDataset, geometry: Parameters) -> Equations:
+def equations_of(dataset: RobotDataset, geometry: Parameters) -> RobotEquations:
     """Constraint equations of a data set without effects."""
     measured = dataset.measured
     if not dataset.has_tension:
         measured = replace(measured, tension=np.full_like(measured.tension, np.nan))
-    return Equations(
+    return RobotEquations(
         robot_of(replace(dataset.robot, effect=())),
         geometry,
         measured,
@@ -130,7 +130,7 @@ def equations_of(dataset: RobotDataset, geometry: Parameters) -> Equations:
     )
 
 
-def _with_terms(equations: Equations, terms: Sequence[Term]) -> Equations:
+def _with_terms(equations: RobotEquations, terms: Sequence[Term]) -> RobotEquations:
     parameters = equations.parameters.with_terms(terms)
     return replace(equations, parameters=parameters, terms=tuple(terms))
 
@@ -141,7 +141,9 @@ def point_of_file(
     """Least-squares estimate of the poses alone, with geometry and effects as given."""
     equations = equations_of(dataset, geometry_parameters(dataset, {}))
     pose = placed(_with_terms(equations, terms), sigma).pose
-    return LinearizationPoint(dataset, equations, State(equations.parameters.nominal, pose), sigma)
+    return LinearizationPoint(
+        dataset, equations, BundleState(equations.parameters.nominal, pose), sigma
+    )
 
 
 def fitted_point(
@@ -159,5 +161,5 @@ def fitted_point(
     zero = np.array([own.zero for own in geometry])
     values = np.where(zero, 0.0, found.values[: len(geometry)])
     instruments = tuple(term for term in terms if term.effect.stage is Stage.TRACKER)
-    state = State(values, found.pose)
+    state = BundleState(values, found.pose)
     return LinearizationPoint(dataset, equations, state, sigma, instruments), terms

@@ -14,8 +14,8 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.errors import Fault, RunError
-from winchkit.robot.files.poses import Measured, read_poses, read_trajectory
-from winchkit.robot.identification.trajectory import Trajectory, trajectory_of
+from winchkit.robot.files.poses import MeasuredPoses, read_poses, read_trajectory
+from winchkit.robot.identification.trajectory import SampledMotion, trajectory_of
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -37,12 +37,12 @@ class RobotDataset(Dataset):
     wing: ClassVar[str] = "robot"
 
     robot: RobotProfile
-    measured: Measured
+    measured: MeasuredPoses
     pose: NDArray[np.intp]
     """Number of the distinct pose of each row, (p,)."""
     runs: tuple[str, ...]
     """Files."""
-    trajectory: Trajectory | None = None
+    trajectory: SampledMotion | None = None
     """Motion along the rows where they are samples in time; None for poses at rest."""
     balanced: bool = True
     """Whether the measured tensions balance the platform's weight well enough to be used."""
@@ -161,7 +161,7 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
     )
 
 
-def _motion_note(measured: Measured, trajectory: Trajectory, robot: RobotProfile) -> str:
+def _motion_note(measured: MeasuredPoses, trajectory: SampledMotion, robot: RobotProfile) -> str:
     """How the rows of a trajectory are used, and the forces that its motion needs."""
     inertial = trajectory.inertial_wrench(robot.platform)[:, :3]
     force = float(np.sqrt(np.mean(np.sum(inertial**2, axis=1))))
@@ -171,7 +171,7 @@ def _motion_note(measured: Measured, trajectory: Trajectory, robot: RobotProfile
     )
 
 
-def _distinct(measured: Measured) -> NDArray[np.intp]:
+def _distinct(measured: MeasuredPoses) -> NDArray[np.intp]:
     """Number of each row's distinct pose, (p,)."""
     angle = measured.motor_angle
     spread = np.maximum(np.nanstd(angle, axis=0), 1e-9)

@@ -14,7 +14,7 @@ from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import BAND_LEVEL, LackOfFitTest
-from winchkit.diagnosis.regression.noise import Noise, noise_saturated
+from winchkit.diagnosis.regression.noise import BandNoise, noise_saturated
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import base_of
@@ -40,26 +40,26 @@ class PoseSelection(SelectionEngine):
         self.pose_noise = noise
         super().__init__(regression, initial_model, candidates)
 
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Unit variance: rows are whitened with the variance components."""
         bands = self.regression.bands
         dof = np.array([self.pose_noise.dof.get(output, 1.0) for output, _, _ in bands])
-        return Noise(
+        return BandNoise(
             power=np.ones(len(bands)),
             dof=np.maximum(dof, 1.0),
             rms=dict.fromkeys(self.regression.outputs, 1.0),
             from_repeats=self.pose_noise.from_repeats,
         )
 
-    def held_out_errors(self, fitted: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    def held_out_errors(self, fitted: Fit, noise: BandNoise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of cable lengths, platform position and tensions, SI."""
         return held_out_rms(FittedModel(self.regression, fitted, noise, folds))
 
-    def _choose_folds(self, fitted: Fit, noise: Noise) -> Folds:
+    def _choose_folds(self, fitted: Fit, noise: BandNoise) -> Folds:
         """Groups of poses: every unknown is common to all of them."""
         return self.regression.groups
 
-    def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
+    def _test_lack_of_fit(self, present: Fit, noise: BandNoise) -> LackOfFitTest:
         """F test of the residual sum of squares against the variance from repeated poses."""
         regression = self.regression
         count = len(regression.bands)
@@ -81,7 +81,7 @@ class TrajectorySelection(PoseSelection):
 
     regression: TrajectoryRegression
 
-    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Variance by frequency band beside all candidates; that of the prior's rows is one."""
         columns = np.array(self.signatures.columns)
         tension = self.regression.rows_of({"tension"})

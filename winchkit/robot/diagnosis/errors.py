@@ -20,7 +20,7 @@ from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import held_out_rms as held_out_rows
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import OutputFit
 from winchkit.model.rotation import rotation_by, skew
 from winchkit.robot.diagnosis.dataset import RobotDataset
@@ -41,7 +41,7 @@ class FittedModel:
 
     regression: PoseRegression
     fit: Fit
-    noise: Noise
+    noise: BandNoise
     folds: Folds
 
 

@@ -22,11 +22,11 @@ from winchkit.model.rotation import angles_of
 from winchkit.robot.diagnosis.adjustment import equations_of
 from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.regression import PoseRegression
-from winchkit.robot.files.poses import Measured, joined
+from winchkit.robot.files.poses import MeasuredPoses, joined
 from winchkit.robot.forces.force_distribution import approximate_forces
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.bundle_adjustment import BundleState
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
     in_box,
@@ -90,7 +90,7 @@ def usable(kind: PoseCandidates, dataset: RobotDataset) -> bool:
 
 def simulated_poses(
     regression: PoseRegression, robot: Robot, kind: PoseCandidates
-) -> tuple[Measured, Pose]:
+) -> tuple[MeasuredPoses, Pose]:
     """Simulate measurements at random poses of a kind, without noise."""
     rng = np.random.default_rng(_SEED)
     pose = _placed(regression, robot, kind, rng)
@@ -258,7 +258,7 @@ def _words(offer: PoseOffer) -> str:
 
 
 def _with_all(
-    regression: PoseRegression, simulated: Sequence[tuple[PoseCandidates, Measured, Pose]]
+    regression: PoseRegression, simulated: Sequence[tuple[PoseCandidates, MeasuredPoses, Pose]]
 ) -> PoseRegression:
     """Regression of the poses so far and all simulated ones.
 
@@ -274,7 +274,7 @@ def _with_all(
     distinct = np.arange(len(measured), dtype=np.intp)
     extended = replace(dataset, measured=measured, pose=distinct, trajectory=None)
     equations = equations_of(extended, point.equations.parameters)
-    state = State(point.state.values, pose)
+    state = BundleState(point.state.values, pose)
     return PoseRegression(replace(point, dataset=extended, equations=equations, state=state))
 
 

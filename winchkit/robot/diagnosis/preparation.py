@@ -17,7 +17,7 @@ from scipy.special import fdtri
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
@@ -189,7 +189,7 @@ class Preparation:
         """Selection engine with the geometry free, under the priors of a calibration."""
         return self.engine(self.prior, self.guess)
 
-    def gain_of_geometry(self, engine: PoseSelection, model: Hypothesis, noise: Noise) -> float:
+    def gain_of_geometry(self, engine: PoseSelection, model: Hypothesis, noise: BandNoise) -> float:
         """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
         point = engine.regression.point
         geometry = self.prior.about(point.state.values)

@@ -30,7 +30,7 @@ from winchkit.robot.forces.balance import force_basis
 from winchkit.robot.geometry.constraints import ZERO_STD, mean_offset
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import Tracker
-from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.bundle_adjustment import BundleState
 from winchkit.robot.identification.equations import KINDS, READING_OF
 
 COPIES = 5
@@ -212,7 +212,7 @@ class PoseRegression(Regression):
     def _zeroed(self, residuals: dict[str, Array]) -> dict[str, Array]:
         return residuals | {kind: residuals[kind] + zero for kind, zero in self._zeros.items()}
 
-    def _residuals(self, state: State, robot: Robot) -> dict[str, Array]:
+    def _residuals(self, state: BundleState, robot: Robot) -> dict[str, Array]:
         """Residuals by kind, with the tensions in one basis for all hypotheses."""
         kinds = KINDS if self.dataset.hangs else tuple(READING_OF)
         if self._start and robot.tracker is None and self.robot.tracker is None:
@@ -242,7 +242,7 @@ class PoseRegression(Regression):
         if hypothesis.nuisances:
             moved_by = np.array(hypothesis.nuisances[first:])
             values[free] += moved_by * self.equations.parameters.std[free]
-        moved = replace(self.point, state=State(values, self.point.pose))
+        moved = replace(self.point, state=BundleState(values, self.point.pose))
         found = self._residuals(moved.state, moved.robot(hypothesis.terms))
         found = self._zeroed(found)
         for kind in self._zeros:

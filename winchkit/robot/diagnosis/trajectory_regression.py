@@ -22,7 +22,7 @@ from winchkit.diagnosis.data.spectrum import Band, band_edges, to_time
 from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.robot.diagnosis.adjustment import LinearizationPoint
 from winchkit.robot.diagnosis.regression import COPIES, PoseRegression, continuous
-from winchkit.robot.identification.trajectory import Trajectory
+from winchkit.robot.identification.trajectory import SampledMotion
 
 _BLOCKS = 24
 """Blocks of time for the rank test and the jackknife; as for poses."""
@@ -37,7 +37,7 @@ class TrajectoryRegression(PoseRegression):
     """
 
     @property
-    def trajectory(self) -> Trajectory:
+    def trajectory(self) -> SampledMotion:
         """Motion along the samples."""
         assert self.dataset.trajectory is not None
         return self.dataset.trajectory

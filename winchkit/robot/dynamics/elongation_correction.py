@@ -22,7 +22,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.elastic import ElongationLaw, Linear
+from winchkit.model.elastic import ElongationLaw, LinearLaw
 from winchkit.robot.dynamics.cycle import flat_pose
 from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels
 from winchkit.robot.forces.force_distribution import approximate_forces
@@ -157,7 +157,7 @@ class ElongationCorrection:
                     f"{robot.profile.name}: line {line.name} has no cable.axial_stiffness; "
                     "measure it, or hand in a law per line"
                 )
-            laws.append(Linear(winch.cable.axial_stiffness))
+            laws.append(LinearLaw(winch.cable.axial_stiffness))
         pose = reference or robot.home
         middle = np.full(len(laws), middle_force)
         initial = approximate_forces(robot.structure(pose), robot.weight(pose), middle)[0]

@@ -39,7 +39,7 @@ class ElasticCables:
 
 
 @dataclass(frozen=True)
-class Simulated:
+class SimulatedPlatform:
     """The platform at k instants."""
 
     time: Array
@@ -88,7 +88,7 @@ def integrate(
     rate: Callable[[float], Array] | None = None,
     time: Array,
     tolerance: float = 1e-8,
-) -> Simulated:
+) -> SimulatedPlatform:
     """Integrate the platform's motion.
 
     Parameters
@@ -157,4 +157,4 @@ def integrate(
     there, moving = placed(found.y.T)
     rest, rates = (np.array([given(float(now)) for now in time]) for given in (unstrained, paid))
     force = cable_forces(geometry, cables, there, moving, rest, rate=rates)
-    return Simulated(np.asarray(found.t), there, moving, force)
+    return SimulatedPlatform(np.asarray(found.t), there, moving, force)

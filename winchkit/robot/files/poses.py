@@ -35,7 +35,7 @@ _TRACKED_QUATERNION = ("tracker_qw", "tracker_qx", "tracker_qy", "tracker_qz")
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredPoses:
     """Measurements at p poses of a robot with n lines."""
 
     motor_angle: Array
@@ -71,15 +71,15 @@ class Measured:
         count = int(self.run.max()) + 1 if len(self.run) else 0
         return self.session_of_run or tuple(f"run {n + 1}" for n in range(count))
 
-    def __getitem__(self, rows: NDArray[np.bool_]) -> Measured:
+    def __getitem__(self, rows: NDArray[np.bool_]) -> MeasuredPoses:
         """The poses of a mask."""
         return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS})
 
 
-class Samples(NamedTuple):
+class MotionSamples(NamedTuple):
     """Rows of logs of a robot in motion."""
 
-    measured: Measured
+    measured: MeasuredPoses
     """(p,) rows of all runs."""
     time: Array
     """Since each run's start, (p,), s."""
@@ -99,10 +99,10 @@ _AS_BASE = (
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
 _CIRCULAR = frozenset({"angles", "swivel"})
 """Whose mean over a hold is the circular one."""
-_ARRAYS = tuple(field.name for field in fields(Measured) if field.name not in _SCALARS)
+_ARRAYS = tuple(field.name for field in fields(MeasuredPoses) if field.name not in _SCALARS)
 
 
-def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
+def read_poses(runs: Sequence[Run], profile: RobotProfile) -> MeasuredPoses:
     """Poses of all runs.
 
     Parameters
@@ -114,7 +114,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
 
     Returns
     -------
-    Measured
+    MeasuredPoses
         Rows without a motor angle are left out and noted.
 
     Raises
@@ -128,7 +128,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
     if not runs:
         raise RunError("no run given")
     faults: list[Fault] = []
-    parts: list[Measured] = []
+    parts: list[MeasuredPoses] = []
     for run in runs:
         found = _faults(run, profile)
         faults += found
@@ -153,7 +153,7 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
     return replace(poses[~again], notes=(*poses.notes, note))
 
 
-def copies(poses: Measured, of: Measured | None = None) -> NDArray[np.bool_]:
+def copies(poses: MeasuredPoses, of: MeasuredPoses | None = None) -> NDArray[np.bool_]:
     """Rows that equal an earlier one, or one of other poses, in every number, (p,).
 
     Two measurements of one pose differ by their noise: a copy measures nothing, and as a held-out
@@ -168,14 +168,14 @@ def copies(poses: Measured, of: Measured | None = None) -> NDArray[np.bool_]:
     return out
 
 
-def _numbers(poses: Measured) -> Iterator[bytes]:
+def _numbers(poses: MeasuredPoses) -> Iterator[bytes]:
     """All numbers of each pose."""
     table = [getattr(poses, name) for name in _ARRAYS if name not in {"run", "place"}]
     for row in np.hstack(table):
         yield np.asarray(row + 0.0).tobytes()
 
 
-def held_unmeasured(measured: Measured, profile: RobotProfile) -> NDArray[np.bool_]:
+def held_unmeasured(measured: MeasuredPoses, profile: RobotProfile) -> NDArray[np.bool_]:
     """Coordinates of a position that guides hold and nothing measured, (3,): in no distance."""
     seen = np.any(np.isfinite(measured.position), axis=0)
     return np.asarray(~seen & (np.array(profile.platform.free[:3]) == 0))
@@ -187,7 +187,7 @@ def of_poses(mask: NDArray[np.bool_]) -> str:
     return f"{count} of {len(mask)} poses {'is' if count == 1 else 'are'}"
 
 
-def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | None:
+def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> MotionSamples | None:
     """Rows of logs of a robot in motion.
 
     Returns: None where the runs are poses: a row each, also along a path with a time of each, or
@@ -210,7 +210,7 @@ def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | Non
         times.append((run.time - run.time[0])[moved])
     if count >= _FEWEST_HOLDS and rest >= _REST * sum(map(len, times)):
         return None
-    return Samples(joined(parts), np.concatenate(times))
+    return MotionSamples(joined(parts), np.concatenate(times))
 
 
 _SLOWEST = 0.5
@@ -220,7 +220,7 @@ _NUMBERED = "row number"
 """Metadata ``time`` of a run whose file has none."""
 
 
-def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
+def _stands_still(measured: MeasuredPoses, profile: RobotProfile) -> bool:
     """Whether all rows are one pose."""
     ratio = [
         line.winch.gearbox.ratio if isinstance(line.winch, WinchProfile) else 1.0
@@ -232,13 +232,13 @@ def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
     return bool(np.all(high - low < _LEAST_TURN * np.array(ratio)))
 
 
-def joined(parts: Sequence[Measured]) -> Measured:
+def joined(parts: Sequence[MeasuredPoses]) -> MeasuredPoses:
     """Concatenated poses of several parts."""
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }
     notes = tuple(note for part in parts for note in part.notes)
-    return Measured(
+    return MeasuredPoses(
         **arrays,
         length_zeroed=all(part.length_zeroed for part in parts),
         session_of_run=tuple(name for part in parts for name in part.session_of_run),
@@ -284,7 +284,7 @@ def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
     return given, [name for name in names if name not in given]
 
 
-def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
+def _of_run(run: Run, profile: RobotProfile, number: int) -> MeasuredPoses:
     rows, messages = _rows_of(run, profile, number)
     poses, of_log = _of_holds(rows, run)
     notes = [f"{run.path or run.name}: {note}" for note in (*messages, *of_log)]
@@ -295,7 +295,7 @@ def _motor_angles(run: Run, profile: RobotProfile) -> Array:
     return np.stack([_column(run, f"{line.name}.motor_angle") for line in profile.line], axis=1)
 
 
-def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, list[str]]:
+def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[MeasuredPoses, list[str]]:
     """Rows with a motor angle, and notes on what is missing."""
     names = [line.name for line in profile.line]
 
@@ -307,7 +307,7 @@ def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, li
     def known(values: Mapping[str, float] | str) -> Array:
         return np.array([0.0 if isinstance(values, str) else values.get(n, 0.0) for n in names])
 
-    found = Measured(
+    found = MeasuredPoses(
         motor_angle=per_line("motor_angle"),
         position=np.stack([_column(run, name) for name in _position_columns(run)], axis=1),
         angles=_angles(run),
@@ -339,7 +339,7 @@ def _quaternion_columns(run: Run) -> tuple[str, ...]:
     return _QUATERNION if _position_columns(run) is _POSITION else _TRACKED_QUATERNION
 
 
-def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
+def _of_holds(rows: MeasuredPoses, run: Run) -> tuple[MeasuredPoses, list[str]]:
     """A pose per hold of a log; the rows themselves where each is a pose."""
     holds = holds_of(rows.motor_angle)
     if holds is None:
@@ -376,7 +376,7 @@ def _partly(run: Run, profile: RobotProfile) -> list[str]:
     ]
 
 
-def _gaps(found: Measured, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
+def _gaps(found: MeasuredPoses, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
     notes = []
     if left := int(np.count_nonzero(~moved)):
         notes.append(f"{left} rows without any motor angle were left out")

@@ -13,11 +13,11 @@ from winchkit.schema.profiles.robot import HomeSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
 from winchkit.schema.reading.lines import Key
-from winchkit.schema.reading.parts import Reading
+from winchkit.schema.reading.parts import FileReading
 from winchkit.schema.robot_programme import RobotProgramme
 
 
-def robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
+def robot(reading: FileReading, tree: dict[str, Any]) -> RobotProfile | None:
     """A robot, with the profiles of the lines that name one."""
     tree = {"name": reading.stem, **tree}
     if "effect" in tree:
@@ -41,7 +41,7 @@ def _with_home(profile: RobotProfile | None) -> RobotProfile | None:
     return replace(profile, home=HomeSpec(tuple(position), tuple(angles)))
 
 
-def _line(reading: Reading, raw: object, at: Key) -> object:
+def _line(reading: FileReading, raw: object, at: Key) -> object:
     """A line with its winch's profile in place of a name or a table."""
     if not isinstance(raw, dict) or "winch" not in raw:
         return raw
@@ -57,7 +57,7 @@ def _line(reading: Reading, raw: object, at: Key) -> object:
     return {**raw, "winch": profile or str(winch)}
 
 
-def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
+def _named_winch(reading: FileReading, name: str, at: Key) -> WinchProfile | None:
     path = reading.shipped("profiles", name, at)
     if path is None:
         return None
@@ -68,6 +68,6 @@ def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
         return None
 
 
-def programme(reading: Reading, tree: dict[str, Any]) -> RobotProgramme | None:
+def programme(reading: FileReading, tree: dict[str, Any]) -> RobotProgramme | None:
     """A programme of the platform, with the file's name where it gives itself none."""
     return reading.table(RobotProgramme, {"name": reading.stem, **tree})

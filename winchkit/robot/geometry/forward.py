@@ -92,7 +92,7 @@ _DISTINCT = 1e-2
 
 
 @dataclass(frozen=True)
-class Found:
+class PosesFound:
     """Poses for given cable lengths; NaN where none meets them."""
 
     pose: Pose
@@ -118,7 +118,7 @@ def forward(
     *,
     tolerance: float = AGREEMENT,
     search: float | Literal["outlying"] = RESOLUTION,
-) -> Found:
+) -> PosesFound:
     """Solve the forward kinematics of p poses.
 
     Parameters
@@ -143,7 +143,7 @@ def forward(
 
     Returns
     -------
-    Found
+    PosesFound
         NaN where no pose within a quarter turn of the start meets the lengths.
 
     Raises
@@ -165,11 +165,11 @@ def forward(
     begin = Pose(
         np.broadcast_to(start.position, (many, 3)), np.broadcast_to(start.rotation, (many, 3, 3))
     )
-    at_rest = _Search(geometry, given, platform if hanging else None).run(begin, steps)
+    at_rest = _PoseSearch(geometry, given, platform if hanging else None).run(begin, steps)
     best, other = at_rest.best, _Candidates.none(many)
     if hanging and len(rows := np.flatnonzero(~np.isfinite(best.worst))):
         at = Pose(begin.position[rows], begin.rotation[rows])
-        again = _Search(geometry, given[rows], platform, _WEAK).run(at, steps)
+        again = _PoseSearch(geometry, given[rows], platform, _WEAK).run(at, steps)
         best.put(rows, again.best, np.ones(len(rows), dtype=bool))
         at_rest.forces[rows] = again.forces
     if not hanging:
@@ -182,7 +182,7 @@ def forward(
     converged = (best.worst <= tolerance) & np.isfinite(best.worst)
     rivals = converged & (other.worst <= _BETTER * np.maximum(best.worst, RESOLUTION))
     at_rest.forces[~converged] = np.nan
-    return Found(
+    return PosesFound(
         best.pose_where(converged),
         converged,
         residual,
@@ -271,7 +271,7 @@ def _search_further(
             starts.rotation[left, round_].reshape(-1, 3, 3),
         )
         pulled = np.repeat(given[rows[left]], count, axis=0)
-        ends = _Search(geometry, pulled, None).run(at, _EARLY * len(_LONGEST)).best
+        ends = _PoseSearch(geometry, pulled, None).run(at, _EARLY * len(_LONGEST)).best
         for number in range(count):
             new = ends.of(np.arange(number, len(left) * count, count))
             new.apart[:] = distance(new.pose, Pose(begin.position[left], begin.rotation[left]))
@@ -352,7 +352,7 @@ class _Cables(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Search:
+class _PoseSearch:
     geometry: Geometry
     given: Array
     platform: PlatformSpec | None

@@ -15,7 +15,7 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
-from winchkit.robot.geometry.forward import AGREEMENT, RESOLUTION, Found, forward
+from winchkit.robot.geometry.forward import AGREEMENT, RESOLUTION, PosesFound, forward
 from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
@@ -252,7 +252,7 @@ class Robot:
         *,
         tolerance: float = AGREEMENT,
         search: float | Literal["outlying"] = RESOLUTION,
-    ) -> Found:
+    ) -> PosesFound:
         """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home.
 
         Parameters
@@ -270,7 +270,7 @@ class Robot:
 
         Returns
         -------
-        Found
+        PosesFound
             Poses, and which of them have converged.
         """
         given = self.lengths_at(motor_angles, tension, temperature)

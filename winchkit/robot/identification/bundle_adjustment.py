@@ -72,7 +72,7 @@ class Unknowns(Protocol):
 
 
 @dataclass(frozen=True)
-class State:
+class BundleState:
     """Point at which the equations are evaluated: parameters (q,), and p poses."""
 
     values: Array
@@ -92,17 +92,17 @@ class Rows:
     """Derivative by the parameters, (p, k, q); None where it is zero."""
 
 
-class Equations(Protocol):
+class BundleEquations(Protocol):
     """Observation equations of poses as functions of parameters and poses."""
 
     @property
     def parameters(self) -> Unknowns:
         """The parameters."""
 
-    def constraints(self, state: State) -> Iterable[tuple[str, Constraint]]:
+    def constraints(self, state: BundleState) -> Iterable[tuple[str, Constraint]]:
         """Equations by kind with derivatives by the pose at least."""
 
-    def rows(self, state: State) -> Iterable[Rows]:
+    def rows(self, state: BundleState) -> Iterable[Rows]:
         """Equations by kind with derivatives by the vector of parameters."""
 
 
@@ -131,7 +131,7 @@ class Stack:
 
 
 @dataclass(frozen=True)
-class Linear:
+class ReducedEquations:
     """Equations linearised at a state and reduced to the parameters."""
 
     stack: Stack
@@ -145,7 +145,7 @@ class Linear:
     gradient: Array
     """Gradient of the cost by the scaled parameters, poses eliminated, with the prior, (q,)."""
 
-    def damped(self, damping: float) -> Linear:
+    def damped(self, damping: float) -> ReducedEquations:
         """The same equations with the poses damped as the parameters are.
 
         A pose with few measurements has the longest step of its own.
@@ -165,30 +165,33 @@ class Linear:
 class Solution:
     """End of a fit."""
 
-    state: State
-    linear: Linear
+    state: BundleState
+    linear: ReducedEquations
     held: NDArray[np.int_]
     """(q,): −1 at the lower bound, 1 at the upper one, 0 between."""
     steps: int
     converged: bool
 
 
-def place(equations: Equations, state: State, weights: Weights) -> State:
+def place(equations: BundleEquations, state: BundleState, weights: Weights) -> BundleState:
     """Estimate the poses alone, with least squares and the parameters of the state."""
 
     def whitened(pose: Pose) -> tuple[Array, Array]:
-        found = list(equations.constraints(State(state.values, pose)))
+        found = list(equations.constraints(BundleState(state.values, pose)))
         residual = np.concatenate([c.residual / weights.sigma[kind] for kind, c in found], axis=1)
         by_pose = np.concatenate([c.by_pose / weights.sigma[kind] for kind, c in found], axis=1)
         known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
         residual[~known], by_pose[~known] = 0.0, 0.0
         return residual, by_pose
 
-    return State(state.values, estimated_pose(whitened, state.pose, _PLACING))
+    return BundleState(state.values, estimated_pose(whitened, state.pose, _PLACING))
 
 
 def solve(
-    equations: Equations, state: State, weights: Weights, progress: Progress | None = None
+    equations: BundleEquations,
+    state: BundleState,
+    weights: Weights,
+    progress: Progress | None = None,
 ) -> Solution:
     """Fit poses and parameters by Levenberg and Marquardt's method with bounds.
 
@@ -225,12 +228,12 @@ def solve(
     return Solution(state, linear, held, _STEPS, converged=False)
 
 
-def moved(state: State, values: Array, step: Array) -> State:
+def moved(state: BundleState, values: Array, step: Array) -> BundleState:
     """State with other parameters and with poses moved by (p, 6)."""
-    return State(values, moved_pose(state.pose, step))
+    return BundleState(values, moved_pose(state.pose, step))
 
 
-def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
+def linearise(equations: BundleEquations, state: BundleState, weights: Weights) -> ReducedEquations:
     """Whiten the equations at a state and reduce them to the parameters.
 
     Equations without a measurement, or without a finite value, get a residual and derivatives of
@@ -279,7 +282,7 @@ def stacked(equations: Iterable[Rows], weights: Weights, scale: Array) -> Stack:
     return Stack(kinds, known, residual, by_pose, by_values)
 
 
-def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> Linear:
+def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> ReducedEquations:
     many, rows, count = stack.by_values.shape
     turned = np.swapaxes(stack.by_pose, 1, 2)
     normal = turned @ stack.by_pose
@@ -294,10 +297,10 @@ def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> L
     information = flat.T @ flat - coupled.T @ coupled
     seen = (half @ stack.residual[..., None]).reshape(6 * many)
     gradient = flat.T @ stack.residual.reshape(-1) - coupled.T @ seen + prior
-    return Linear(stack, cost, prior, factor, information, gradient)
+    return ReducedEquations(stack, cost, prior, factor, information, gradient)
 
 
-def _pose_steps(linear: Linear, change: Array) -> Array:
+def _pose_steps(linear: ReducedEquations, change: Array) -> Array:
     """Steps of the poses that belong to a change of the scaled parameters, (p, 6)."""
     left = linear.stack.residual + linear.stack.by_values @ change
     gradient = np.swapaxes(linear.stack.by_pose, 1, 2) @ left[..., None]
@@ -306,7 +309,7 @@ def _pose_steps(linear: Linear, change: Array) -> Array:
 
 
 def _bounded_step(
-    equations: Equations, state: State, linear: Linear, damping: float
+    equations: BundleEquations, state: BundleState, linear: ReducedEquations, damping: float
 ) -> tuple[Array, NDArray[np.int_]]:
     """Parameters after a damped step within the bounds, and the bounds that are active.
 
@@ -336,7 +339,7 @@ def _bounded_step(
     return values, held
 
 
-def leverage(linear: Linear) -> Array:
+def leverage(linear: ReducedEquations) -> Array:
     """Leverage of each equation: diagonal of the hat matrix, (p, r), between 0 and 1."""
     half = linear.factor @ np.swapaxes(linear.stack.by_pose, 1, 2)
     rest = linear.pose_free

@@ -64,9 +64,9 @@ from winchkit.robot.geometry.tracker import (
     tracked_rotation,
 )
 from winchkit.robot.geometry.wrench import weight_by_payload
-from winchkit.robot.identification.bundle_adjustment import Rows, State, Weights, place
+from winchkit.robot.identification.bundle_adjustment import BundleState, Rows, Weights, place
 from winchkit.robot.identification.parametrized_robot import ParametrizedRobot
-from winchkit.robot.identification.trajectory import Trajectory
+from winchkit.robot.identification.trajectory import SampledMotion
 
 READING_OF = {
     "closure": "motor_angle",
@@ -90,12 +90,12 @@ is divided by; numerical."""
 
 
 @dataclass(frozen=True)
-class Equations(ParametrizedRobot):
+class RobotEquations(ParametrizedRobot):
     """Constraint equations of a robot at measured poses."""
 
     middle_force: float | None = None
     """Force, N, to which cable forces that were not measured are nearest; None without such."""
-    trajectory: Trajectory | None = None
+    trajectory: SampledMotion | None = None
     """Motion along the rows where they are samples in time."""
     balanced: bool | None = None
     """Whether the balance of cable forces takes part; None where a calibration decides it."""
@@ -119,7 +119,7 @@ class Equations(ParametrizedRobot):
         there = np.where(known, behind.position, home.position)
         return self.robot.guided(Pose(there, behind.rotation))
 
-    def of(self, poses: NDArray[np.bool_]) -> Equations:
+    def of(self, poses: NDArray[np.bool_]) -> RobotEquations:
         """The equations of some of the poses, (p,)."""
         return replace(self, measured=self.measured[poses])
 
@@ -247,7 +247,7 @@ class Equations(ParametrizedRobot):
         return Strain(strain, {"law": by_law, "payload": slope[..., None] * by_payload})
 
     def constraints(
-        self, state: State, robot: Robot | None = None
+        self, state: BundleState, robot: Robot | None = None
     ) -> Iterator[tuple[str, Constraint]]:
         """All equations at a state, by kind, with derivatives by each line's own numbers.
 
@@ -267,7 +267,7 @@ class Equations(ParametrizedRobot):
             # Guides hold the other coordinates, whatever a tracker shows of them.
             yield kind, replace(found, by_pose=found.by_pose * robot.geometry.free)
 
-    def rows(self, state: State) -> Iterator[Rows]:
+    def rows(self, state: BundleState) -> Iterator[Rows]:
         """All equations at a state with derivatives by the vector of parameters."""
         robot = self.robot_at(state.values)
         by_terms = self._by_terms(state, robot)
@@ -279,13 +279,13 @@ class Equations(ParametrizedRobot):
                 by_values[..., self.parameters.block["terms"]] = by_terms[kind]
             yield Rows(kind, constraint.residual, constraint.by_pose, by_values)
 
-    def offsets(self, kind: str, state: State) -> Array:
+    def offsets(self, kind: str, state: BundleState) -> Array:
         """Mean reading of each line's instrument beyond its zero, (n,)."""
         residual = self.residuals(state, self.robot_at(state.values), [kind])[kind]
         return mean_offset(residual, angles=kind == "swivel")
 
     def residuals(
-        self, state: State, robot: Robot, kinds: Iterable[str], whiten: Array | None = None
+        self, state: BundleState, robot: Robot, kinds: Iterable[str], whiten: Array | None = None
     ) -> dict[str, Array]:
         """Residuals by kind without derivatives, (p, k) each; NaN where nothing was measured.
 
@@ -431,7 +431,7 @@ class Equations(ParametrizedRobot):
                 out[..., block[name].ravel()] = part
         return out
 
-    def _by_terms(self, state: State, robot: Robot) -> dict[str, Array]:
+    def _by_terms(self, state: BundleState, robot: Robot) -> dict[str, Array]:
         """Derivatives by the coordinates of effects, (p, k, m), by kind; empty without effects."""
         if not self.terms:
             return {}
@@ -447,7 +447,9 @@ class Equations(ParametrizedRobot):
             step = _STEP * max(1.0, abs(state.values[index]))
             moved = state.values.copy()
             moved[index] += step if moved[index] + step <= high[index] else -step
-            there = self.residuals(State(moved, state.pose), self.robot_at(moved), kinds, whiten)
+            there = self.residuals(
+                BundleState(moved, state.pose), self.robot_at(moved), kinds, whiten
+            )
             for kind, column in columns.items():
                 by = (there[kind] - here[kind]) / (moved[index] - state.values[index])
                 column.append(by)
@@ -480,21 +482,23 @@ def _force_behind(line: Line, at: At, shown: Array) -> Array:
     return force
 
 
-def placed(equations: Equations, sigma: Mapping[str, float]) -> State:
+def placed(equations: RobotEquations, sigma: Mapping[str, float]) -> BundleState:
     """Nominal parameters within bounds, and the poses estimated with them.
 
     Swivel angles and length instruments take no part: their zeros are not known.
     """
     values = np.clip(equations.parameters.nominal, *equations.parameters.bounds)
     weights = Weights({**sigma, "swivel": np.inf, "cable_length": np.inf})
-    return place(equations, State(values, equations.start(values)), weights)
+    return place(equations, BundleState(values, equations.start(values)), weights)
 
 
-def started(equations: Equations, sigma: Mapping[str, float]) -> tuple[Equations, State]:
+def started(
+    equations: RobotEquations, sigma: Mapping[str, float]
+) -> tuple[RobotEquations, BundleState]:
     """The state of :func:`placed`, with the zeros of instruments at their mean readings."""
     state, parameters = placed(equations, sigma), equations.parameters
     for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
         if block in parameters.block:
             parameters = parameters.starting(block, equations.offsets(kind, state))
     values = np.clip(parameters.nominal, *parameters.bounds)
-    return replace(equations, parameters=parameters), State(values, state.pose)
+    return replace(equations, parameters=parameters), BundleState(values, state.pose)

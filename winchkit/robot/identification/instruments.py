@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import rotation_residual
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
@@ -38,7 +38,7 @@ OF_LINES = ("cell_gain", "length_scale")
 
 
 @dataclass(frozen=True)
-class Instruments:
+class InstrumentValues:
     """Numbers of instruments: those that are estimated, and the values of the tracker's."""
 
     free: frozenset[str]
@@ -55,7 +55,7 @@ class Instruments:
             return False
         return all(tracker.is_trivial for tracker in self.trackers)
 
-    def session_of(self, measured: Measured) -> NDArray[np.intp]:
+    def session_of(self, measured: MeasuredPoses) -> NDArray[np.intp]:
         """Index of the session of each pose, (p,); −1 where it is another session."""
         index = {name: n for n, name in enumerate(self.sessions)}
         of_run = [index.get(name, -1) for name in measured.sessions]
@@ -63,7 +63,7 @@ class Instruments:
             return np.full(len(measured), of_run[0], dtype=np.intp)
         return np.array(of_run, dtype=np.intp)[measured.run]
 
-    def at(self, measured: Measured) -> Tracker:
+    def at(self, measured: MeasuredPoses) -> Tracker:
         """The tracker with a frame per pose; that of the first session for other sessions."""
         which = np.maximum(self.session_of(measured), 0)
         shift = np.stack([t.shift for t in self.trackers])[which]
@@ -71,7 +71,7 @@ class Instruments:
         return replace(self.trackers[0], shift=shift, turn=turn)
 
 
-def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
+def declared_instruments(robot: Robot, measured: MeasuredPoses) -> InstrumentValues:
     """Instruments as the robot's file declares them."""
     spec = robot.profile.instrument
     tracker = robot.tracker or declared_tracker(robot.profile)
@@ -96,17 +96,17 @@ def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
         if not np.any(np.isfinite(values)):
             free -= names
     sessions = tuple(dict.fromkeys(measured.sessions[run] for run in np.unique(measured.run)))
-    return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
+    return InstrumentValues(frozenset(free), sessions, (tracker,) * len(sessions))
 
 
 def registered_instruments(
-    instruments: Instruments,
+    instruments: InstrumentValues,
     free: Collection[str],
     predicted: Pose,
-    measured: Measured,
+    measured: MeasuredPoses,
     *,
     imu: bool,
-) -> Instruments:
+) -> InstrumentValues:
     """Instruments with these numbers free, at the values of the closed-form registration.
 
     ``instruments``: values of the numbers that are not free. ``free``: of :data:`NUMBERS`.
@@ -124,12 +124,12 @@ def registered_instruments(
 
 
 def _registered(
-    instruments: Instruments,
+    instruments: InstrumentValues,
     free: frozenset[str],
     predicted: Pose,
-    measured: Measured,
+    measured: MeasuredPoses,
     turns: bool,
-) -> Instruments:
+) -> InstrumentValues:
     """Common numbers from all sessions at once, then a frame per session."""
     first = replace(
         instruments.trackers[0],
@@ -147,7 +147,7 @@ def _registered(
         free,
     )
     if common == free:
-        return Instruments(free, instruments.sessions, (whole,) * len(instruments.sessions))
+        return InstrumentValues(free, instruments.sessions, (whole,) * len(instruments.sessions))
     trackers = []
     for number in range(len(instruments.sessions)):
         rows = which == number
@@ -155,10 +155,12 @@ def _registered(
         trackers.append(
             registered(whole, own, measured.position[rows], measured.angles[rows], free & {"frame"})
         )
-    return Instruments(free, instruments.sessions, tuple(trackers))
+    return InstrumentValues(free, instruments.sessions, tuple(trackers))
 
 
-def _misfit_of_rotation(instruments: Instruments, predicted: Pose, measured: Measured) -> float:
+def _misfit_of_rotation(
+    instruments: InstrumentValues, predicted: Pose, measured: MeasuredPoses
+) -> float:
     shown = reading_of(instruments.at(measured), predicted)
     difference = rotation_residual(shown.rotation, measured.angles)
     return float(np.nanmean(difference**2))

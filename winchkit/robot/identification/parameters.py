@@ -14,10 +14,10 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.instruments import LARGEST_SCALE, Instruments
+from winchkit.robot.identification.instruments import LARGEST_SCALE, InstrumentValues
 from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
@@ -73,7 +73,7 @@ def _fault(table: EffectTable, message: str) -> Fault:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class IdentifiedParameter:
     """One parameter in the unit that is fitted."""
 
     name: str
@@ -97,19 +97,19 @@ class Parameter:
         return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
 
 
-LAWS: dict[str, tuple[Parameter, ...]] = {
+LAWS: dict[str, tuple[IdentifiedParameter, ...]] = {
     "cable-elongation-linear": (
-        Parameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+        IdentifiedParameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
     ),
     "cable-elongation-quartic": (
-        Parameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
-        Parameter("b2", "1", 0.0, 100.0),
-        Parameter("b3", "1", 0.0, 3e4),
-        Parameter("b4", "1", 0.0, 1e7),
+        IdentifiedParameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+        IdentifiedParameter("b2", "1", 0.0, 100.0),
+        IdentifiedParameter("b3", "1", 0.0, 3e4),
+        IdentifiedParameter("b4", "1", 0.0, 1e7),
     ),
     "cable-elongation-exponential": (
-        Parameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
-        Parameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
+        IdentifiedParameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
+        IdentifiedParameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
     ),
 }
 """Laws of elongation that can be parameters, one for all cables."""
@@ -149,7 +149,7 @@ _FLAT = 1e3
 class Estimated:
     """Estimate of one parameter, in the unit of files."""
 
-    parameter: Parameter
+    parameter: IdentifiedParameter
     nominal: float
     value: float
     std: float
@@ -162,13 +162,13 @@ class Estimated:
 class Parameters:
     """All parameters, and the indices of each block."""
 
-    all: tuple[Parameter, ...]
+    all: tuple[IdentifiedParameter, ...]
     block: dict[str, Indices]
     """Indices by block; (n, 3) for points, (n,) for what a line has one of."""
     law: str | None
     """Law of elongation that is fitted."""
 
-    def __iter__(self) -> Iterator[Parameter]:
+    def __iter__(self) -> Iterator[IdentifiedParameter]:
         return iter(self.all)
 
     def __len__(self) -> int:
@@ -220,13 +220,15 @@ class Parameters:
 
     def with_terms(self, terms: Sequence[Term]) -> Parameters:
         """These and the coordinates of effects, which are near one in size, with a flat prior."""
-        more: list[Parameter] = []
+        more: list[IdentifiedParameter] = []
         for term in terms:
             own = Coordinates(term.effect)
             start, low, high = own.vector(term.values), *own.bounds()
             for name, *numbers in zip(own.names, start, low, high, strict=True):
                 at, least, most = map(float, numbers)
-                more.append(Parameter(f"{term.effect.id}.{name}", "1", at, _FLAT, least, most))
+                more.append(
+                    IdentifiedParameter(f"{term.effect.id}.{name}", "1", at, _FLAT, least, most)
+                )
         block = {**self.block, "terms": np.arange(len(self), len(self) + len(more))}
         return replace(self, all=(*self.all, *more), block=block)
 
@@ -236,10 +238,10 @@ class _Builder:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.all: list[Parameter] = []
+        self.all: list[IdentifiedParameter] = []
         self.block: dict[str, Indices] = {}
 
-    def add(self, block: str, parameters: Sequence[Parameter], *shape: int) -> None:
+    def add(self, block: str, parameters: Sequence[IdentifiedParameter], *shape: int) -> None:
         """Append a block; its indices get ``shape``."""
         start = len(self.all)
         self.all += parameters
@@ -253,7 +255,7 @@ class _Builder:
         """Three coordinates a line; those that are not ``fitted`` (3,) have no prior's width."""
         std = self.prior(name).std
         found = [
-            Parameter(f"{line}.{name}.{axis}", "m", float(value), std * free)
+            IdentifiedParameter(f"{line}.{name}.{axis}", "m", float(value), std * free)
             for line, point in zip(self.robot.names, values, strict=True)
             for axis, value, free in zip("xyz", point, fitted.tolist(), strict=True)
         ]
@@ -264,7 +266,7 @@ class _Builder:
         prior = self.prior(name)
         low, high = prior.bounds or (0.0, np.inf)
         found = [
-            Parameter(f"{line}.{name}", "m", value, prior.std * free, low, high)
+            IdentifiedParameter(f"{line}.{name}", "m", value, prior.std * free, low, high)
             for line, value, free in zip(self.robot.names, values, fitted, strict=True)
         ]
         self.add(name, found)
@@ -274,7 +276,7 @@ class _Builder:
         if not any(effect.partition("/")[0] == "gear-ratio" for effect in effects):
             return
         found = [
-            Parameter(
+            IdentifiedParameter(
                 f"{line}.gear_ratio",
                 "1",
                 winch.gearbox.ratio,
@@ -290,16 +292,17 @@ class _Builder:
     def zeros(self, name: str, unit: str, std: float, *, zero: bool) -> None:
         """One number a line that starts at zero."""
         found = [
-            Parameter(f"{line}.{name}", unit, 0.0, std, zero=zero) for line in self.robot.names
+            IdentifiedParameter(f"{line}.{name}", unit, 0.0, std, zero=zero)
+            for line in self.robot.names
         ]
         self.add(name, found)
 
 
 def parameters_of(
     robot: Robot,
-    measured: Measured,
+    measured: MeasuredPoses,
     effects: Sequence[str] = (),
-    instruments: Instruments | None = None,
+    instruments: InstrumentValues | None = None,
 ) -> Parameters:
     """Parameters of geometry, winches, named effects and instruments.
 
@@ -347,7 +350,7 @@ def parameters_of(
     return found
 
 
-def _of_law(law: str, own: Mapping[str, float]) -> list[Parameter]:
+def _of_law(law: str, own: Mapping[str, float]) -> list[IdentifiedParameter]:
     """Parameters of a law that start at the values of the robot's file."""
     out = []
     for spec in LAWS[law]:
@@ -382,27 +385,29 @@ def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
     low, high = prior.bounds or (0.0, np.inf)
     std = prior.std if growths else 0.0
     value = growths[0] if growths else 0.0
-    build.add("layer_growth", [Parameter("layer_growth", "m", value, std, low, high)])
+    build.add("layer_growth", [IdentifiedParameter("layer_growth", "m", value, std, low, high)])
 
 
 def _payload(build: _Builder, effects: Sequence[str]) -> None:
     platform = build.robot.profile.platform
     std = max(_MASS_SHARE * platform.mass, _MASS_LEAST) * ("payload-mass" in effects)
-    build.add("payload_mass", [Parameter("payload-mass.mass", "kg", platform.mass, std, 0.0)])
+    build.add(
+        "payload_mass", [IdentifiedParameter("payload-mass.mass", "kg", platform.mass, std, 0.0)]
+    )
     std = _CENTRE * ("payload-centre" in effects)
     found = [
-        Parameter(f"payload-centre.{axis}", "m", value, std)
+        IdentifiedParameter(f"payload-centre.{axis}", "m", value, std)
         for axis, value in zip("xyz", platform.center_of_mass, strict=True)
     ]
     build.add("payload_centre", found)
 
 
-def _tracker(build: _Builder, instruments: Instruments) -> None:
+def _tracker(build: _Builder, instruments: InstrumentValues) -> None:
     """Numbers of a tracker that are free; a frame per session."""
 
     def add(block: str, names: Sequence[str], units: Sequence[str], values: Array) -> None:
         found = [
-            Parameter(
+            IdentifiedParameter(
                 name,
                 unit,
                 float(value),

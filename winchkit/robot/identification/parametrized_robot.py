@@ -13,10 +13,10 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.drum import drum_of
 from winchkit.robot.effects.term import robot_with_terms
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.kinematics import Geometry, lengths
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.instruments import Instruments
+from winchkit.robot.identification.instruments import InstrumentValues
 from winchkit.robot.identification.parameters import Parameters
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED
@@ -29,9 +29,9 @@ class ParametrizedRobot:
     robot: Robot
     """With nominal numbers, without effects."""
     parameters: Parameters
-    measured: Measured
+    measured: MeasuredPoses
     """Poses, each in a session of its tracker."""
-    instruments: Instruments | None = None
+    instruments: InstrumentValues | None = None
     """Of the measured poses; None where the robot has its own tracker."""
     effects: tuple[str, ...] = ()
     """Effects that are parameters, beside those of the robot's profile."""
@@ -125,7 +125,7 @@ class ParametrizedRobot:
             tracker=self.robot.tracker if own is None else own.at(self.measured),
         )
 
-    def instruments_at(self, values: Array) -> Instruments | None:
+    def instruments_at(self, values: Array) -> InstrumentValues | None:
         """Instruments with the parameters' values."""
         own, block = self.instruments, self.parameters.block
         if own is None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import angles_of, rotation_of
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.forces.force_distribution import ForceLimits, wrench_feasibility
 from winchkit.robot.geometry.kinematics import (
     Geometry,
@@ -79,8 +79,12 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
 
 
 def simulated(
-    measured: Measured, robot: Robot, pose: Pose, tension: Array, temperature: Array | float = 20.0
-) -> Measured:
+    measured: MeasuredPoses,
+    robot: Robot,
+    pose: Pose,
+    tension: Array,
+    temperature: Array | float = 20.0,
+) -> MeasuredPoses:
     """Measurements at poses without noise; NaN where nothing was measured so far."""
     many = len(pose.position)
 

@@ -26,7 +26,7 @@ from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
 from winchkit.robot.dynamics.smoothed_motion import SmoothedMotion, smoothed_motion
 from winchkit.robot.files.holds import averaged
-from winchkit.robot.files.poses import Measured, Samples, joined
+from winchkit.robot.files.poses import MeasuredPoses, MotionSamples, joined
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.geometry.wrench import gravity_wrench
@@ -44,7 +44,7 @@ _CHANNELS = ("position", "angles", "swivel", "cable_length", "tension")
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class SampledMotion:
     """Motion at the p samples of a data set, run after run."""
 
     time: Array
@@ -112,7 +112,9 @@ def _displacement(curve: CubicSpline, time: Array, delay: float) -> Array:
     return np.hstack([there[:, :3] - here[:, :3], rotation_vector(turned)])
 
 
-def trajectory_of(samples: Samples, profile: RobotProfile) -> tuple[Measured, Trajectory]:
+def trajectory_of(
+    samples: MotionSamples, profile: RobotProfile
+) -> tuple[MeasuredPoses, SampledMotion]:
     """Samples that are compared, and the motion along them.
 
     Returns: ``measured``: means over blocks. Raises RunError for a run with fewer than 50 samples,
@@ -153,11 +155,13 @@ def trajectory_of(samples: Samples, profile: RobotProfile) -> tuple[Measured, Tr
     ends = np.cumsum([0, *map(len, parts)]).tolist()
     valid, measured = _compared(measured)
     runs = tuple(slice(a, b) for a, b in pairwise(ends))
-    motion = Trajectory(np.concatenate(times), runs, np.concatenate(rates), valid, tuple(motions))
+    motion = SampledMotion(
+        np.concatenate(times), runs, np.concatenate(rates), valid, tuple(motions)
+    )
     return measured, motion
 
 
-def _blocks(samples: Samples, lines: tuple[Line, ...]) -> list[list[slice]]:
+def _blocks(samples: MotionSamples, lines: tuple[Line, ...]) -> list[list[slice]]:
     """Blocks of rows of each run, of equal length, in which no cable moves by more than 5 mm."""
     rows, out = samples.measured, []
     for number in range(int(rows.run.max()) + 1):
@@ -180,7 +184,7 @@ def _bridged(values: Array) -> Array:
     )
 
 
-def _averaged(rows: Measured, blocks: list[slice], angle: Array, number: int) -> Measured:
+def _averaged(rows: MeasuredPoses, blocks: list[slice], angle: Array, number: int) -> MeasuredPoses:
     """Means over blocks; NaN where one value of a block is missing."""
     means: dict[str, Any] = {}
     for name in (*_CHANNELS, "temperature"):
@@ -197,7 +201,7 @@ def _averaged(rows: Measured, blocks: list[slice], angle: Array, number: int) ->
     )
 
 
-def _compared(measured: Measured) -> tuple[NDArray[np.bool_], Measured]:
+def _compared(measured: MeasuredPoses) -> tuple[NDArray[np.bool_], MeasuredPoses]:
     """Samples that have all channels which most samples have; rarer channels are left out.
 
     The equations of all samples are then the same, as a spectrum over time needs. Missing values

@@ -13,14 +13,20 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.pose_estimation import start_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import Tracker, declared_tracker, pose_behind
-from winchkit.robot.identification.bundle_adjustment import HUBER, Solution, State, Weights, solve
-from winchkit.robot.identification.equations import Equations
-from winchkit.robot.identification.instruments import Instruments
+from winchkit.robot.identification.bundle_adjustment import (
+    HUBER,
+    BundleState,
+    Solution,
+    Weights,
+    solve,
+)
+from winchkit.robot.identification.equations import RobotEquations
+from winchkit.robot.identification.instruments import InstrumentValues
 from winchkit.robot.identification.parameters import HOME_LENGTH, parameters_of
 
 _STD = {
@@ -37,14 +43,14 @@ _LEAST_RADIUS = 1e-4
 
 
 def adjustment_of(
-    robot: Robot, measured: Measured, tracker: Tracker, held: frozenset[str] = frozenset()
-) -> Equations:
+    robot: Robot, measured: MeasuredPoses, tracker: Tracker, held: frozenset[str] = frozenset()
+) -> RobotEquations:
     """Equations of lengths and positions; the tracker starts at its registration.
 
     ``held``: blocks of parameters that keep their values.
     """
     robot = replace(robot, profile=replace(robot.profile, effect=()))
-    instruments = Instruments(frozenset({"frame", "reflector"}), ("",), (tracker,))
+    instruments = InstrumentValues(frozenset({"frame", "reflector"}), ("",), (tracker,))
     nothing: dict[str, Any] = {
         name: np.full_like(getattr(measured, name), np.nan)
         for name in ("angles", "swivel", "cable_length", "tension")
@@ -59,7 +65,7 @@ def adjustment_of(
             std = 0.0 if block in held else _STD.get(block, 0.0) * (own.nominal if radius else 1.0)
             low = _LEAST_RADIUS if radius else -np.inf
             everything[index] = replace(own, std=std, low=low, high=np.inf)
-    return Equations(
+    return RobotEquations(
         robot,
         replace(parameters, all=tuple(everything)),
         measured,
@@ -68,13 +74,13 @@ def adjustment_of(
     )
 
 
-def adjusted(adjustment: Equations, pose: Pose, sigma: float) -> Solution:
+def adjusted(adjustment: RobotEquations, pose: Pose, sigma: float) -> Solution:
     """The adjustment from these poses; ``sigma``: standard deviation of an equation, m."""
     weights = Weights({"closure": sigma, "position": sigma}, robust=True)
-    return solve(adjustment, State(adjustment.parameters.nominal, pose), weights)
+    return solve(adjustment, BundleState(adjustment.parameters.nominal, pose), weights)
 
 
-def misfit(adjustment: Equations, solution: Solution, sigma: float) -> float:
+def misfit(adjustment: RobotEquations, solution: Solution, sigma: float) -> float:
     """Root mean square of the equations of the usual pose, with the priors' part, m.
 
     A mistake is in every pose, gross errors are in some. Infinite where an equation has no value.
@@ -92,7 +98,7 @@ def misfit(adjustment: Equations, solution: Solution, sigma: float) -> float:
     return sigma * float(np.sqrt(np.median(square) + of_priors))
 
 
-def lengths_at_home(robot: Robot, measured: Measured, sigma: float) -> Array:
+def lengths_at_home(robot: Robot, measured: MeasuredPoses, sigma: float) -> Array:
     """Cable at home beyond that of the geometry, (n,), m, of positions in a known frame."""
     tracker = declared_tracker(robot.profile)
     equations = adjustment_of(robot, measured, tracker, frozenset({"tracker_frame", "reflector"}))

@@ -21,7 +21,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import by_pose
 from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
@@ -91,7 +91,7 @@ class _Trial:
 class _Adjusted(_Trial):
     """A trial with the geometry free."""
 
-    table: Measured
+    table: MeasuredPoses
     """Without the mistakes."""
     pose: Pose
     turned: Array
@@ -126,14 +126,14 @@ class Named:
         )
 
 
-def refuse_mistakes(robot: Robot, measured: Measured) -> None:
+def refuse_mistakes(robot: Robot, measured: MeasuredPoses) -> None:
     """Raise RunError with the mistakes that the runs of these poses contain."""
     found = mistakes_in(robot, measured)
     if found:
         raise RunError([Fault(str(n), n.place, key=n.code) for n in found])
 
 
-def mistakes_in(robot: Robot, measured: Measured) -> tuple[Named, ...]:
+def mistakes_in(robot: Robot, measured: MeasuredPoses) -> tuple[Named, ...]:
     """Mistakes of each run of twelve poses or more of a robot whose cables hold its platform."""
     out: list[Named] = []
     if robot.hangs:
@@ -142,11 +142,11 @@ def mistakes_in(robot: Robot, measured: Measured) -> tuple[Named, ...]:
         own = _whole(measured[measured.run == run])
         if len(own) >= _FEWEST:
             place = str(own.place[0]).partition(" of ")[2]
-            out += _Search(robot, own, place).found()
+            out += _MistakeSearch(robot, own, place).found()
     return tuple(out)
 
 
-def _whole(measured: Measured) -> Measured:
+def _whole(measured: MeasuredPoses) -> MeasuredPoses:
     """Rows with all motor angles, and with whole positions where there are any."""
     rows = np.all(np.isfinite(measured.motor_angle), axis=1)
     seen = np.all(np.isfinite(measured.position), axis=1)
@@ -154,11 +154,11 @@ def _whole(measured: Measured) -> Measured:
 
 
 @dataclass(frozen=True)
-class _Search:
+class _MistakeSearch:
     """Search in one run."""
 
     robot: Robot
-    measured: Measured
+    measured: MeasuredPoses
     place: str
 
     @property
@@ -166,7 +166,7 @@ class _Search:
         """Rms motion of the cables about their mean, m; at most a fifth of the robot's size."""
         return self._motion_of(self.measured)
 
-    def _motion_of(self, table: Measured) -> float:
+    def _motion_of(self, table: MeasuredPoses) -> float:
         moved = self.robot.lengths_at(table.motor_angle)
         spread = float(np.sqrt(np.mean(np.var(moved, axis=0))))
         return min(spread, 0.2 * self.robot.geometry.size)

@@ -23,7 +23,7 @@ from winchkit.model.rotation import (
     rotation_from_quaternion,
     rotation_of,
 )
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.robot import Robot
 
 _MOST_ROWS = 3
@@ -51,7 +51,7 @@ class Mistake:
     code: str
     text: str
     cure: str
-    mended: Callable[[Measured], Measured]
+    mended: Callable[[MeasuredPoses], MeasuredPoses]
     """The table without the mistake."""
     axes: Array = field(default_factory=lambda: np.eye(3))
     """Of positions: those shown are ``axes`` @ those meant, (3, 3)."""
@@ -121,7 +121,7 @@ def _shift(rows: int) -> Mistake:
     count, way = abs(rows), "earlier" if rows > 0 else "later"
     s = "s" if count > 1 else ""
 
-    def mended(measured: Measured) -> Measured:
+    def mended(measured: MeasuredPoses) -> MeasuredPoses:
         """The poses of row i beside the motor angles of row i + ``rows``."""
         pose, motor = slice(0, len(measured) - count), slice(count, None)
         if rows < 0:
@@ -268,7 +268,7 @@ def _quaternions(order: list[int]) -> Callable[[Array], Array]:
 
 
 def _turned(code: str, words: str, cure: str, convert: Callable[[Array], Array]) -> Mistake:
-    def mended(measured: Measured) -> Measured:
+    def mended(measured: MeasuredPoses) -> MeasuredPoses:
         whole = np.all(np.isfinite(measured.angles), axis=1)
         angles = np.full_like(measured.angles, np.nan)
         angles[whole] = angles_of(convert(measured.angles[whole]))
@@ -285,15 +285,15 @@ def _columns(order: NDArray[np.intp]) -> Callable[[Array], Array]:
     return lambda values: np.asarray(values[:, order])
 
 
-def _of(name: str, change: Callable[[Array], Array]) -> Callable[[Measured], Measured]:
-    def mended(measured: Measured) -> Measured:
+def _of(name: str, change: Callable[[Array], Array]) -> Callable[[MeasuredPoses], MeasuredPoses]:
+    def mended(measured: MeasuredPoses) -> MeasuredPoses:
         changed: dict[str, Any] = {name: change(getattr(measured, name))}
         return replace(measured, **changed)
 
     return mended
 
 
-def mended(measured: Measured, mistakes: Sequence[Mistake]) -> Measured:
+def mended(measured: MeasuredPoses, mistakes: Sequence[Mistake]) -> MeasuredPoses:
     """The table without these mistakes."""
     for mistake in mistakes:
         measured = mistake.mended(measured)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from winchkit.quantity_text import quantity
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.html.markup import Markup, element, folded, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
@@ -184,7 +184,7 @@ def calibration_figures(found: Calibrated, source: str = "") -> list[Figure]:
     if not len(every):
         return []
     limits = (float(every.min()) / 1.25, float(every.max()) * 1.25)
-    up = Axis("position error", "mm", logarithmic=True, limits=limits)
+    up = FigureAxis("position error", "mm", logarithmic=True, limits=limits)
     return [
         _figure(name, title, up, (before, after), source)
         for name, title, before, after in pairs
@@ -193,7 +193,7 @@ def calibration_figures(found: Calibrated, source: str = "") -> list[Figure]:
 
 
 def _figure(
-    name: str, title: str, up: Axis, errors: tuple[PoseErrors, PoseErrors], source: str
+    name: str, title: str, up: FigureAxis, errors: tuple[PoseErrors, PoseErrors], source: str
 ) -> Figure:
     """Points over the poses on a logarithmic axis, rms as lines."""
     before, after = errors
@@ -204,20 +204,20 @@ def _figure(
     ):
         size = np.asarray(one.distance, dtype=float) * _MM
         size[~(size > 0)] = np.nan
-        series.append(Series(word, tone, number, size, "points"))
+        series.append(FigureSeries(word, tone, number, size, "points"))
     for drawn in series[:2]:
         known = drawn.y[np.isfinite(drawn.y)]
         mean = float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
         ends = np.array([0.0, len(after.distance) + 1.0])
         text = f"rms {quantity(mean / _MM, 'm')}"
-        line = Series("", drawn.tone, ends, np.full(2, mean), "line", text)
+        line = FigureSeries("", drawn.tone, ends, np.full(2, mean), "line", text)
         series.append(line)
     return Figure(
         f"pose-error-{name}",
         title,
         f"{title}: distance of the predicted from the measured position, before and after "
         "calibration.",
-        Axis("pose", limits=(0.0, len(after.distance) + 1.0)),
+        FigureAxis("pose", limits=(0.0, len(after.distance) + 1.0)),
         (Panel(up, tuple(series)),),
         source=source,
         names=tuple(str(place) for place in after.place),

@@ -13,7 +13,7 @@ from winchkit.arrays import Array
 from winchkit.profile_edit.naming import extended_name
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import AxisLabel, reading
-from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.html.markup import Markup, element, table
@@ -22,7 +22,7 @@ from winchkit.report.pages.addition import addition_sections
 from winchkit.report.pages.comparison import comparison_sections
 from winchkit.report.pages.diagnosis import sections
 from winchkit.report.pages.parts import output_card
-from winchkit.report.reproducibility import Command
+from winchkit.report.reproducibility import CommandLine
 from winchkit.report.tables import bar
 from winchkit.report.words.headline import size_texts, worst_outputs
 from winchkit.report.words.sentence import capital, where_text
@@ -33,7 +33,7 @@ from winchkit.robot.diagnosis.compare import RobotCompared
 from winchkit.robot.diagnosis.diagnose import RobotAnswer
 from winchkit.robot.diagnosis.errors import UNITS, Errors
 from winchkit.robot.diagnosis.regression import PoseRegression
-from winchkit.robot.report.pose_traces import NUMBER, Trace, traces
+from winchkit.robot.report.pose_traces import NUMBER, PoseErrorTrace, traces
 
 _SPREAD = 0.25
 """Of the distance between two places: points of equal value are drawn beside each other."""
@@ -83,7 +83,7 @@ def _cards(
     return cards
 
 
-def _figure(trace: Trace, noise: float | None, changed: str) -> Figure:
+def _figure(trace: PoseErrorTrace, noise: float | None, changed: str) -> Figure:
     """Points of every pose, means as lines, the noise as a band."""
     how, unit = reading(trace.over.variable), UNITS[trace.over.output]
     scale = scale_for(float(np.abs(trace.before).max(initial=0.0)), unit)
@@ -96,12 +96,12 @@ def _figure(trace: Trace, noise: float | None, changed: str) -> Figure:
     series = []
     for tone, name, values in states:
         mark: Literal["dots", "points"] = "dots" if len(x) > _FEW_POSES else "points"
-        series.append(Series(name, tone, x, values / scale.worth, mark))
+        series.append(FigureSeries(name, tone, x, values / scale.worth, mark))
     for tone, name, values in states:
         at, mean = trace.means(values)
         if trace.over.variable != "winch":
             shown = np.asarray(how.shown(at))
-            series.append(Series(f"mean, {name}", tone, shown, mean / scale.worth, "mean"))
+            series.append(FigureSeries(f"mean, {name}", tone, shown, mean / scale.worth, "mean"))
     output = OUTPUT_NAMES.get(trace.over.output, trace.over.output)
     over = VARIABLE_NAMES.get(trace.over.variable, trace.over.variable)
     line = "" if trace.line is None else f", {_line_word(trace)} {trace.line}"
@@ -112,7 +112,7 @@ def _figure(trace: Trace, noise: float | None, changed: str) -> Figure:
         _axis(trace, how),
         (
             Panel(
-                Axis("measured less predicted", scale.label, zero=True),
+                FigureAxis("measured less predicted", scale.label, zero=True),
                 tuple(series),
                 None if noise is None or not isfinite(noise) else noise / scale.worth,
             ),
@@ -120,18 +120,18 @@ def _figure(trace: Trace, noise: float | None, changed: str) -> Figure:
     )
 
 
-def _line_word(trace: Trace) -> str:
+def _line_word(trace: PoseErrorTrace) -> str:
     return "along" if trace.over.output == "platform_position" else "line"
 
 
-def _differ(trace: Trace) -> bool:
+def _differ(trace: PoseErrorTrace) -> bool:
     """Whether the added effects changed this output."""
     assert trace.after is not None
     sizes = [float(np.sqrt(np.mean(values**2))) for values in (trace.before, trace.after)]
     return max(sizes) > _CHANGED * min(sizes)
 
 
-def _caption(trace: Trace, noise: float | None) -> str:
+def _caption(trace: PoseErrorTrace, noise: float | None) -> str:
     over = trace.over
     if over.variable == NUMBER:
         name = OUTPUT_NAMES.get(over.output, over.output)
@@ -145,15 +145,17 @@ def _caption(trace: Trace, noise: float | None) -> str:
     return f"{capital(text)}. Points are poses, lines their means.{band}"
 
 
-def _axis(trace: Trace, how: AxisLabel) -> Axis:
+def _axis(trace: PoseErrorTrace, how: AxisLabel) -> FigureAxis:
     if trace.over.variable == "winch":
         last = float(trace.x.max())
         names = tuple((float(n), str(n)) for n in range(1, int(last) + 1))
-        return Axis("line, in the order of the file", limits=(0.4, last + 0.6), categories=names)
+        return FigureAxis(
+            "line, in the order of the file", limits=(0.4, last + 0.6), categories=names
+        )
     return how.axis()
 
 
-def _beside(trace: Trace, x: Array) -> Array:
+def _beside(trace: PoseErrorTrace, x: Array) -> Array:
     """Positions of the points; those of one line are side by side."""
     if trace.over.variable != "winch":
         return x
@@ -194,7 +196,7 @@ def report_html(
 ) -> str:
     """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
     selection, diagnosis = answer.selection, answer.diagnosis
-    command = Command(selection.preparation.dataset, profile, options)
+    command = CommandLine(selection.preparation.dataset, profile, options)
     drawn = _report_figures(answer, command.source)
     before, after = selection.errors
     fitted = after if diagnosis.steps else None
@@ -255,7 +257,7 @@ def comparison_html(
 ) -> str:
     """The page of a robot's comparison."""
     comparison = compared.comparison
-    command = Command(compared.regression.dataset, profile, options)
+    command = CommandLine(compared.regression.dataset, profile, options)
     drawn = _comparison_figures(compared, command.source)
     sizes = size_texts(comparison.outputs)
     ladder = error_ladder(comparison.outputs, source=command.source)
@@ -290,7 +292,7 @@ def addition_html(
     options: Sequence[str] = (),
 ) -> str:
     """The page of an effect added to a robot; ``better`` is the profile that was written."""
-    command = Command(fitted.regression.dataset, profile, options)
+    command = CommandLine(fitted.regression.dataset, profile, options)
     drawn = _addition_figures(fitted, command.source)
     sizes = size_texts(fitted.addition.outputs)
     cards = _cards(fitted.regression, drawn, *fitted.errors, sizes)

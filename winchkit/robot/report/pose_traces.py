@@ -33,7 +33,7 @@ _POOLED = ("winch", "pose", NUMBER)
 
 
 @dataclass(frozen=True)
-class Trace:
+class PoseErrorTrace:
     """Errors of one output along one variable, SI; a value per pose and line, or axis."""
 
     over: Attribution
@@ -90,7 +90,9 @@ def unit_of(variable: str) -> str:
     return VARIABLE_UNITS.get(variable, "1")
 
 
-def traces(regression: PoseRegression, before: Errors, after: Errors | None = None) -> list[Trace]:
+def traces(
+    regression: PoseRegression, before: Errors, after: Errors | None = None
+) -> list[PoseErrorTrace]:
     """Per output its errors over the variable with the largest share before the change."""
     found: dict[str, Attribution] = {}
     for followed in pose_attributions(regression, before):
@@ -107,7 +109,7 @@ def traces(regression: PoseRegression, before: Errors, after: Errors | None = No
 
 def trace_over(
     regression: PoseRegression, over: Attribution, before: Errors, after: Errors | None = None
-) -> Trace:
+) -> PoseErrorTrace:
     """Errors of one output over one variable, of the line with the largest share."""
     name = over.output
     error = on_cables(regression, {name: before[name]})[name]
@@ -123,7 +125,7 @@ def trace_over(
     known = np.isfinite(error) & np.isfinite(x)
     if then is not None:
         known &= np.isfinite(then)
-    return Trace(over, x[known], error[known], None if then is None else then[known], line)
+    return PoseErrorTrace(over, x[known], error[known], None if then is None else then[known], line)
 
 
 def _values(regression: PoseRegression, over: Attribution, error: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from winchkit.catalog import find
 from winchkit.errors import FileError
 from winchkit.robot.sim.cable_end import CableEnd, Coupling
-from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
+from winchkit.robot.sim.platform import CablePlatform, Pulleys, RigidBody
 from winchkit.robot.sim.rotation import rotation
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.sim_platform import PlatformTruth
@@ -51,7 +51,7 @@ def build_robot(bench: SimBench, truth: PlatformTruth, *, compiled: bool = False
     axes = np.array([line.swivel_axis for line in lines], dtype=float)
     radii = np.array([line.swivel_radius for line in lines], dtype=float)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    body = Body(
+    body = RigidBody(
         profile.platform.mass if truth.mass is None else truth.mass,
         np.array(truth.center_of_mass or profile.platform.center_of_mass, dtype=float),
         np.diag(truth.inertia),

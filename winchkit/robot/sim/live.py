@@ -17,7 +17,7 @@ from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.simbench import SimBench, WinchTruth
 
 
-class LiveRobot:
+class LivePlatform:
     """Platform, cable ends and tracker of a simulated bench; not thread-safe.
 
     ``bench``: a bench with ``[robot]``. ``started``: time at which the winches start, s.

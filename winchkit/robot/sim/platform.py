@@ -28,7 +28,7 @@ _LEAST_STEP = 5e-5
 
 
 @dataclass(frozen=True)
-class Body:
+class RigidBody:
     """Rigid body with n anchor points in its own frame."""
 
     mass: float
@@ -63,7 +63,7 @@ class CablePlatform:
 
     def __init__(
         self,
-        body: Body,
+        body: RigidBody,
         pulleys: Pulleys,
         position: Array,
         attitude: Array,

@@ -25,7 +25,7 @@ from winchkit.robot.calibration.calibrate import Calibrated, calibrate, split
 from winchkit.robot.calibration.pose_design import next_poses
 from winchkit.robot.calibration.prediction import cable_errors, rms
 from winchkit.robot.calibration.profile import Provenance, write_calibrated
-from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.robot.forces.force_distribution import ForceLimits, quadratic, wrench_feasibility
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of
@@ -50,7 +50,7 @@ class _State:
     source: str = ""
     profile: RobotProfile | None = None
     files: tuple[Path, ...] = ()
-    measured: Measured | None = None
+    measured: MeasuredPoses | None = None
     found: Calibrated | None = None
     proposed: tuple[dict[str, Any], ...] = ()
     number: int = 0
@@ -184,7 +184,7 @@ class RobotWork:
             raise UsageError("no robot's profile is open; choose one first")
         return self._state.profile
 
-    def _measured(self) -> Measured:
+    def _measured(self) -> MeasuredPoses:
         if self._state.measured is None:
             raise UsageError("no poses are open; drop a recording of the robot's poses")
         return self._state.measured

@@ -17,7 +17,7 @@ from winchkit.robot.web.robot import RobotWork
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.read import read_any
 from winchkit.web.views import Order, View, attachment
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import DiagnoseView
 
 
 class RobotView(View):
@@ -25,7 +25,7 @@ class RobotView(View):
 
     name = "robot"
 
-    def __init__(self, workspace: Workspace, folder: Path) -> None:
+    def __init__(self, workspace: DiagnoseView, folder: Path) -> None:
         super().__init__(workspace, folder)
         self.work = RobotWork(workspace.folder, workspace.named)
 

@@ -81,7 +81,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Demand:
+class CableDemand:
     """What the cables of a robot are to do at each pose; each part may be missing."""
 
     tension: ForceLimits | None = None
@@ -262,7 +262,7 @@ def _turns(robot: Robot, turn: float) -> Array:
     return np.asarray(rotation_by(vectors) @ robot.home.rotation[0])
 
 
-def workspace_of(robot: Robot, grid: Grid, demand: Demand) -> Workspace:
+def workspace_of(robot: Robot, grid: Grid, demand: CableDemand) -> Workspace:
     """Compute the levels of all conditions that a demand has the numbers for.
 
     Parameters
@@ -271,7 +271,7 @@ def workspace_of(robot: Robot, grid: Grid, demand: Demand) -> Workspace:
         One that hangs on fewer cables is considered in its poses of rest, without closure.
     grid : Grid
         Positions and rotations.
-    demand : Demand
+    demand : CableDemand
         Without ``tension`` there is no wrench feasibility, without ``cable_speed`` and a speed no
         twist feasibility.
 
@@ -325,7 +325,7 @@ def workspace_of(robot: Robot, grid: Grid, demand: Demand) -> Workspace:
 
 
 def _of_wrenches(
-    robot: Robot, pose: Pose, structure: Array, demand: Demand, limits: tuple[Array, Array]
+    robot: Robot, pose: Pose, structure: Array, demand: CableDemand, limits: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     free = robot.geometry.free > 0
     spread = float(np.sqrt(np.mean(np.sum(robot.geometry.anchor_point**2, axis=1))))
@@ -340,7 +340,7 @@ def _of_wrenches(
     return margins(given)
 
 
-def _of_twists(structure: Array, demand: Demand) -> Array:
+def _of_twists(structure: Array, demand: CableDemand) -> Array:
     """Least difference of a cable's limit and the speed that it needs, (p,), m/s."""
     moved, turned = (
         np.linalg.norm(structure[:, rows], axis=1) for rows in (slice(0, 3), slice(3, 6))

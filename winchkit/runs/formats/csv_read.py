@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.regular_file import read_whole, regular
-from winchkit.runs.assemble import Recording, assemble, refuse
+from winchkit.runs.assemble import RawColumns, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
 from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
 from winchkit.runs.log import Note, known_event
@@ -137,7 +137,7 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
         number += len(block)
     refuse(table.ragged())
     return assemble(
-        Recording(
+        RawColumns(
             name,
             header,
             table.columns(),

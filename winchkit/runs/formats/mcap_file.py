@@ -13,8 +13,15 @@ from typing import BinaryIO
 import numpy as np
 import zstandard
 
-from winchkit.runs.formats.mcap_records import MARK, Body, Messages, Op, Record, records
-from winchkit.runs.layout import Signal, Source
+from winchkit.runs.formats.mcap_records import (
+    MARK,
+    McapRecord,
+    MessageBlock,
+    Op,
+    RecordBody,
+    records,
+)
+from winchkit.runs.layout import SignalSource, SourceSignal
 
 PROFILE = "winchkit"
 TOPIC = "run"
@@ -39,13 +46,13 @@ def row_schema(columns: Sequence[tuple[str, str]]) -> bytes:
     return json.dumps({"title": SCHEMA, "type": "object", "properties": properties}).encode()
 
 
-def message_name(source: Source) -> str:
+def message_name(source: SignalSource) -> str:
     """Name of a source's message type, after the last word of its topic."""
     word: str = _WORD.findall(source.topic)[-1]
     return f"winchkit/msg/{word.capitalize()}"
 
 
-def message_definition(signals: Sequence[Signal]) -> bytes:
+def message_definition(signals: Sequence[SourceSignal]) -> bytes:
     """The ROS 2 definition of a message; each field has its unit as a comment."""
     return "".join(f"float64 {item.name} # {item.unit}\n" for item in signals).encode()
 
@@ -81,7 +88,7 @@ class McapFile:
         if op in (Op.SCHEMA, Op.CHANNEL):
             self._repeated[op].append(_record(op, body))
         elif op == Op.METADATA:
-            index = struct.pack("<QQ", at, self._at - at) + _text(Body(body).text())
+            index = struct.pack("<QQ", at, self._at - at) + _text(RecordBody(body).text())
             self._repeated[Op.METADATA_INDEX].append(_record(Op.METADATA_INDEX, index))
 
     def put_schema(self, number: int, name: str, encoding: str, data: bytes) -> None:
@@ -100,9 +107,9 @@ class McapFile:
 
     def put_chunk(self, content: bytes) -> None:
         """Write records as one compressed chunk, followed by the index of its messages."""
-        batches = [item for item in records(content) if isinstance(item, Messages)]
+        batches = [item for item in records(content) if isinstance(item, MessageBlock)]
         for item in records(content):
-            if isinstance(item, Record) and item.op in (Op.SCHEMA, Op.CHANNEL):
+            if isinstance(item, McapRecord) and item.op in (Op.SCHEMA, Op.CHANNEL):
                 self._kinds[item.op] += 1
                 self._repeated[item.op].append(_record(item.op, bytes(item.body)))
         first = min((int(item.log_times.min()) for item in batches), default=0)
@@ -128,14 +135,14 @@ class McapFile:
             )
         )
 
-    def count(self, batch: Messages) -> None:
+    def count(self, batch: MessageBlock) -> None:
         """Note messages for the statistics."""
         first, last = int(batch.log_times.min()), int(batch.log_times.max())
         self._first = min(self._first, first) if self._counts else first
         self._last = max(self._last, last)
         self._counts[batch.channel] += len(batch.log_times)
 
-    def put_messages(self, batch: Messages, data: bytes) -> None:
+    def put_messages(self, batch: MessageBlock, data: bytes) -> None:
         """Write messages outside any chunk."""
         self._write(data)
         self.count(batch)
@@ -197,7 +204,7 @@ def _record(op: int, body: bytes) -> bytes:
     return struct.pack("<BQ", op, len(body)) + body
 
 
-def _message_index(channel: int, batches: list[Messages]) -> bytes:
+def _message_index(channel: int, batches: list[MessageBlock]) -> bytes:
     """Log time and place of every message of a channel in a chunk, in order of time."""
     own = [item for item in batches if item.channel == channel]
     times = np.concatenate([item.log_times for item in own])

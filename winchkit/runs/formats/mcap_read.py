@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.assemble import Recording, assemble, refuse
+from winchkit.runs.assemble import RawColumns, assemble, refuse
 from winchkit.runs.formats.csv_read import cut_off, read_bytes
 from winchkit.runs.formats.mcap_file import (
     CDR,
@@ -27,18 +27,18 @@ from winchkit.runs.formats.mcap_file import (
 )
 from winchkit.runs.formats.mcap_records import (
     MARK,
-    Body,
     Damage,
-    Messages,
+    McapRecord,
+    MessageBlock,
     Op,
-    Record,
+    RecordBody,
     chunk_content,
     is_intact,
     joint_after,
     next_chunk,
     records,
 )
-from winchkit.runs.layout import Layout, Samples, Source, read_layout
+from winchkit.runs.layout import Layout, SignalSource, SourceSamples, read_layout
 from winchkit.runs.log import Log, Note, aligned, known_event, log_of_run, tables_in
 from winchkit.runs.run import Run
 
@@ -50,7 +50,7 @@ class McapContent:
     topics: dict[int, str] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """Metadata records by name."""
-    messages: dict[str, list[Messages]] = field(default_factory=dict)
+    messages: dict[str, list[MessageBlock]] = field(default_factory=dict)
     """By topic, in the order of the file."""
     complete: bool = False
     damage: str = ""
@@ -67,10 +67,14 @@ def read_content(data: bytes) -> McapContent:
     end = len(MARK)
     try:
         for item in records(data, len(MARK)):
-            if isinstance(item, Record) and item.op == Op.FOOTER:
+            if isinstance(item, McapRecord) and item.op == Op.FOOTER:
                 content.complete = data[item.end :] == MARK
                 break
-            if isinstance(item, Record) and item.op == Op.DATA_END and not is_intact(item, data):
+            if (
+                isinstance(item, McapRecord)
+                and item.op == Op.DATA_END
+                and not is_intact(item, data)
+            ):
                 content.damage = "the checksum of its data is wrong"
                 break
             _take(content, item)
@@ -92,8 +96,8 @@ def _not_cut(data: bytes, end: int, damage: str) -> str:
     return damage
 
 
-def _take(content: McapContent, item: Record | Messages) -> None:
-    if isinstance(item, Messages):
+def _take(content: McapContent, item: McapRecord | MessageBlock) -> None:
+    if isinstance(item, MessageBlock):
         if item.channel in content.topics:
             content.messages.setdefault(content.topics[item.channel], []).append(item)
     elif item.op == Op.CHUNK:
@@ -105,17 +109,17 @@ def _take(content: McapContent, item: Record | Messages) -> None:
         if end != len(packed):
             raise Damage("a chunk ends within a record")
     elif item.op == Op.CHANNEL:
-        fields = Body(item.body)
+        fields = RecordBody(item.body)
         number = fields.number(2)
         fields.number(2)
         content.topics[number] = fields.text()
     elif item.op == Op.METADATA:
-        fields = Body(item.body)
+        fields = RecordBody(item.body)
         name = fields.text()
         content.metadata[name] = fields.texts()
 
 
-def samples_of(content: McapContent, source: Source, layout: Layout) -> Samples:
+def samples_of(content: McapContent, source: SignalSource, layout: Layout) -> SourceSamples:
     """Samples of a source; raises Damage where its messages do not match the layout."""
     size = len(CDR) + 8 * len(source.signals)
     pieces = []
@@ -124,8 +128,8 @@ def samples_of(content: McapContent, source: Source, layout: Layout) -> Samples:
             raise Damage(f"a message of {source.topic} has {batch.data.shape[1]} bytes, not {size}")
         values = np.ascontiguousarray(batch.data[:, len(CDR) :]).view("<f8")
         times = _seconds(batch.log_times, layout)
-        pieces.append(Samples(times, _seconds(batch.publish_times, layout), values))
-    return Samples.joined(pieces, len(source.signals))
+        pieces.append(SourceSamples(times, _seconds(batch.publish_times, layout), values))
+    return SourceSamples.joined(pieces, len(source.signals))
 
 
 def _seconds(stamps: NDArray[np.uint64], layout: Layout) -> NDArray[np.float64]:
@@ -176,7 +180,7 @@ def _run(name: str, content: McapContent) -> Run:
     values = _values(name, list(columns), rows)
     metadata = content.metadata.get(METADATA, {})
     header = list(columns.items())
-    return assemble(Recording(name, header, list(values), lambda _: None, metadata, notes=notes))
+    return assemble(RawColumns(name, header, list(values), lambda _: None, metadata, notes=notes))
 
 
 def _values(path: str, names: list[str], rows: list[bytes]) -> Array:

@@ -43,7 +43,7 @@ class Damage(ValueError):
 
 
 @dataclass(frozen=True)
-class Record:
+class McapRecord:
     """One record of the file."""
 
     op: int
@@ -57,7 +57,7 @@ class Record:
 
 
 @dataclass(frozen=True)
-class Messages:
+class MessageBlock:
     """Consecutive messages of one channel and size."""
 
     channel: int
@@ -75,7 +75,7 @@ class Messages:
         return self.offset + self.size * len(self.log_times)
 
 
-def records(data: bytes, start: int = 0) -> Iterator[Record | Messages]:
+def records(data: bytes, start: int = 0) -> Iterator[McapRecord | MessageBlock]:
     """Records from ``start`` to the end or to an incomplete record; raises Damage."""
     view = memoryview(data)
     while start + _HEAD.size <= len(data):
@@ -90,7 +90,7 @@ def records(data: bytes, start: int = 0) -> Iterator[Record | Messages]:
             yield batch
             start = batch.end
         else:
-            yield Record(op, start, view[start + _HEAD.size : end])
+            yield McapRecord(op, start, view[start + _HEAD.size : end])
             start = end
 
 
@@ -109,7 +109,7 @@ def _message_type(length: int) -> np.dtype[np.void]:
     )
 
 
-def _messages(data: bytes, start: int, length: int) -> Messages:
+def _messages(data: bytes, start: int, length: int) -> MessageBlock:
     """The message at ``start`` and the following ones of the same kind."""
     if length < _MESSAGE_HEAD:
         raise Damage(f"the message at byte {start} is shorter than its head")
@@ -126,7 +126,7 @@ def _messages(data: bytes, start: int, length: int) -> Messages:
             break
         look *= _LOOK_GROWTH
     found = found[:count]
-    return Messages(
+    return MessageBlock(
         channel=int(found["channel"][0]),
         offset=start,
         size=kind.itemsize,
@@ -152,7 +152,7 @@ def pack_messages(
     return block.tobytes()
 
 
-class Body:
+class RecordBody:
     """Reads the fields of a record in order; raises Damage for invalid ones."""
 
     def __init__(self, body: memoryview | bytes) -> None:
@@ -179,7 +179,7 @@ class Body:
 
     def texts(self) -> dict[str, str]:
         """A map of texts."""
-        inner, found = Body(self.take(self.number(4))), {}
+        inner, found = RecordBody(self.take(self.number(4))), {}
         while not inner.done:
             key = inner.text()
             found[key] = inner.text()
@@ -193,7 +193,7 @@ class Body:
 
 def chunk_content(body: memoryview) -> bytes:
     """The records in a chunk; raises Damage, also for a wrong checksum."""
-    fields = Body(body)
+    fields = RecordBody(body)
     fields.take(16)
     size, crc, compression = fields.number(8), fields.number(4), fields.text()
     packed = bytes(fields.take(fields.number(8)))
@@ -207,13 +207,13 @@ def chunk_content(body: memoryview) -> bytes:
     return content
 
 
-def is_intact(end: Record, data: bytes) -> bool:
+def is_intact(end: McapRecord, data: bytes) -> bool:
     """Whether the checksum in the record at the end of the data matches the data before it."""
     checksum = int.from_bytes(end.body, "little")
     return not checksum or checksum == zlib.crc32(memoryview(data)[: end.offset])
 
 
-def whole_chunk(item: Record) -> bytes | None:
+def whole_chunk(item: McapRecord) -> bytes | None:
     """Content of a chunk; None where it is damaged."""
     try:
         content = chunk_content(item.body)
@@ -230,7 +230,7 @@ def next_chunk(data: bytes, start: int) -> int:
         at = found - _ZSTD_AT
         if at >= start and data[at] == Op.CHUNK:
             item = next(records(data, at), None)
-            if isinstance(item, Record) and whole_chunk(item) is not None:
+            if isinstance(item, McapRecord) and whole_chunk(item) is not None:
                 return at
         found = data.find(_ZSTD, found + 1)
     return len(data)

@@ -13,7 +13,7 @@ from typing import Any
 from winchkit.errors import UsageError, suggest
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.formats.arithmetic import with_derived
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.schema.plausible import typed_quantity
@@ -189,7 +189,7 @@ def read_answers(given: Mapping[str, Any]) -> Answers:
     return with_options(own, map(str, given.get("options") or ()))
 
 
-def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:
+def answers_of(table: ColumnTable, tables: Sequence[ColumnTable], answers: Answers) -> Answers:
     """Answers without the columns that are those of other files.
 
     Returns: a column is that of the files that have its name; where none has, of those that have
@@ -223,7 +223,7 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
     return answers
 
 
-def _is_named(table: Table, name: str) -> bool:
+def _is_named(table: ColumnTable, name: str) -> bool:
     return name in {table.path, Path(table.path).name, Path(table.path).stem}
 
 

@@ -11,7 +11,7 @@ from winchkit.arrays import Array
 from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_spelling import COUNTS, SpelledUnit
 from winchkit.schema.linear_axis import rotary_name
 
@@ -65,7 +65,7 @@ class Question:
 class Guess:
     """Assignments of all columns of a table."""
 
-    table: Table
+    table: ColumnTable
     assignments: tuple[Assignment, ...]
     questions: tuple[Question, ...] = ()
     notes: tuple[str, ...] = ()
@@ -75,11 +75,11 @@ class Guess:
     """Column that names the axis of each row, of a table in long form."""
     kind: str = ""
     """Column that names the kind of each row, of a table whose rows have different quantities."""
-    whole: Table | None = None
+    whole: ColumnTable | None = None
     """The table in long form; ``table`` is that of its first axis, or has columns by kind."""
 
     @property
-    def file(self) -> Table:
+    def file(self) -> ColumnTable:
         """Everything that was read."""
         return self.whole or self.table
 
@@ -96,10 +96,10 @@ class Guess:
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class ChannelCandidate:
     """A column and the channel that it may be."""
 
-    column: Column
+    column: FileColumn
     channel: str
     """Empty where it is not used."""
     rank: int = 0
@@ -122,9 +122,9 @@ class Candidate:
 class Choice:
     """Chosen columns by channel, and why others were not."""
 
-    chosen: list[Candidate] = field(default_factory=list)
+    chosen: list[ChannelCandidate] = field(default_factory=list)
     """Candidates with their final channel."""
-    unused: list[Candidate] = field(default_factory=list)
+    unused: list[ChannelCandidate] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -133,7 +133,7 @@ class Choice:
 class ChosenColumn:
     """A chosen column while its unit is determined."""
 
-    candidate: Candidate
+    candidate: ChannelCandidate
     scale: float | None = None
     """Sign and factor that the user gives, by which the numbers are multiplied before the unit."""
     factor: float | None = None
@@ -146,7 +146,7 @@ class ChosenColumn:
     """How its numbers are stored, where they wrap or have lost their sign."""
 
     @property
-    def column(self) -> Column:
+    def column(self) -> FileColumn:
         """The column of the file."""
         return self.candidate.column
 
@@ -175,7 +175,7 @@ class ChosenColumn:
 class Work:
     """The guess of one table while it is made."""
 
-    table: Table
+    table: ColumnTable
     answers: Answers
     columns: list[ChosenColumn] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)

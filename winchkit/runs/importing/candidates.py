@@ -10,10 +10,10 @@ import numpy as np
 
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import permitted
-from winchkit.runs.importing.assignment import Candidate, Choice, Question
+from winchkit.runs.importing.assignment import ChannelCandidate, Choice, Question
 from winchkit.runs.importing.clocks.row_order import rows_in_order
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
-from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
+from winchkit.runs.importing.names import CURRENT, IGNORED, NamedChannel, meaning_of
 from winchkit.runs.importing.orientation import (
     body_of,
     chosen_body,
@@ -24,7 +24,7 @@ from winchkit.runs.importing.orientation import (
     vector_names,
 )
 from winchkit.runs.importing.source_stamps import SOURCE_STAMP
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNT_RATE,
@@ -68,7 +68,7 @@ _UNEVEN = 0.5
 
 
 def choose(
-    table: Table,
+    table: ColumnTable,
     given: Mapping[str, str],
     body: str | None,
     without: Collection[str] = (),
@@ -86,19 +86,19 @@ def choose(
     linear = is_linear(table, given, motion)
     numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
-    free: list[Candidate] = []
+    free: list[ChannelCandidate] = []
     longest = max((len(item) for item in table.columns), default=0)
     for column in table.columns:
         if column.source in given:
             channel, unit = given[column.source], read_unit(column.unit)
             (choice.chosen if channel else choice.unused).append(
-                Candidate(column, channel, 0, unit, "given")
+                ChannelCandidate(column, channel, 0, unit, "given")
             )
         else:
             found = _candidate(column, numbered, linear=linear)
             if len(column) < min(FEWEST, longest / FEWEST):
                 few = f"{len(column)} values, of a parameter: others have {longest}"
-                found = Candidate(column, "", reason=few)
+                found = ChannelCandidate(column, "", reason=few)
             if found.channel in _SCALAR and column.name in vectors:
                 found = replace(found, rank=_BY_RANK, reason=f"{found.reason}, one of x, y, z")
             (free if found.channel else choice.unused).append(found)
@@ -131,7 +131,7 @@ def choose(
 
 
 def _numbered(
-    table: Table, given: Mapping[str, str], orientation: str, choice: Choice
+    table: ColumnTable, given: Mapping[str, str], orientation: str, choice: Choice
 ) -> dict[str, str]:
     """Channels of a numbered quaternion, whose order its values say or which is asked."""
     names = [item.name for item in table.columns]
@@ -152,17 +152,17 @@ def _numbered(
 
 def _left_after(
     taken: Collection[str],
-    free: list[Candidate],
+    free: list[ChannelCandidate],
     choice: Choice,
     words: str = "is given otherwise",
-) -> list[Candidate]:
+) -> list[ChannelCandidate]:
     for item in free:
         if item.channel in taken:
             choice.unused.append(replace(item, channel="", reason=f"{item.channel} {words}"))
     return [item for item in free if item.channel not in taken]
 
 
-def is_linear(table: Table, given: Mapping[str, str], motion: str = "") -> bool:
+def is_linear(table: ColumnTable, given: Mapping[str, str], motion: str = "") -> bool:
     """Whether a file is of a linear axis: a position in m and a force in N, nothing that turns."""
     bases = {channel.rpartition(".")[2] for channel in given.values()}
     if motion or bases & ROTARY.keys():
@@ -183,27 +183,31 @@ def is_linear(table: Table, given: Mapping[str, str], motion: str = "") -> bool:
     return found >= {"position", "force"}
 
 
-def _candidate(column: Column, numbered: Mapping[str, str], *, linear: bool = False) -> Candidate:
+def _candidate(
+    column: FileColumn, numbered: Mapping[str, str], *, linear: bool = False
+) -> ChannelCandidate:
     """Channel of one column by its name, its unit, or its values."""
     unit = read_unit(column.unit)
     meaning = meaning_of(column.name, column.labels)
     if column.texts is not None:
         return _of_text(column)
     if not np.any(np.isfinite(column.values)):
-        return Candidate(column, "", reason="no values")
+        return ChannelCandidate(column, "", reason="no values")
     if column.name in numbered:
-        return Candidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
+        return ChannelCandidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
     if linear and meaning is not None:
         meaning = replace(meaning, channel=_LINEAR.get(meaning.channel, meaning.channel))
     found = _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
     return replace(found, channel=_LINEAR.get(found.channel, found.channel)) if linear else found
 
 
-def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Candidate:
+def _by_name(
+    column: FileColumn, meaning: NamedChannel, unit: SpelledUnit | None
+) -> ChannelCandidate:
     """Channel that the name stands for, or that of the unit where the two contradict each other."""
     base = meaning.channel.rpartition(".")[2]
     if base == IGNORED:
-        return Candidate(column, "", reason=f"'{meaning.text}': {_NOT_USED}")
+        return ChannelCandidate(column, "", reason=f"'{meaning.text}': {_NOT_USED}")
     if base == CURRENT:
         base, unit = "motor_torque", unit or _current_unit(column)
     unit = unit or named_unit(column.name, permitted(base)) if not column.unit else unit
@@ -211,43 +215,43 @@ def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Cand
     dimension = column_dimension(base)
     fits = unit is None or unit.dimension in permitted(base) or dimension == "ratio"
     if base == "time" and not _is_clock(column):
-        return Candidate(column, "", reason=f"'{meaning.text}', and no clock")
+        return ChannelCandidate(column, "", reason=f"'{meaning.text}', and no clock")
     if base == DATE:
         return _by_unit(column, unit)
     if fits:
-        return Candidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
+        return ChannelCandidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
     found = _by_unit(column, unit)
     return replace(found, rank=_BY_RANK) if found.channel else found
 
 
-def _current_unit(column: Column) -> SpelledUnit | None:
+def _current_unit(column: FileColumn) -> SpelledUnit | None:
     """A for a current without a unit; of an unknown size where the numbers are whole."""
     values = column.values[np.isfinite(column.values)]
     is_whole = bool(np.all(values == np.round(values)))
     return SpelledUnit("", "current", math.nan) if is_whole else read_unit("A")
 
 
-def _by_unit(column: Column, unit: SpelledUnit | None) -> Candidate:
+def _by_unit(column: FileColumn, unit: SpelledUnit | None) -> ChannelCandidate:
     """Channel of a dimension; the time of a first column without a name that increases."""
     channel = "" if unit is None else _BY_DIMENSION.get(unit.dimension, "")
     if channel and (channel != "time" or _is_clock(column)):
-        return Candidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
+        return ChannelCandidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
     if column.number == 1 and column.name.isdecimal() and _is_clock(column, steady=True):
-        return Candidate(column, "time", _BY_ORDER, None, "first column, increasing")
+        return ChannelCandidate(column, "time", _BY_ORDER, None, "first column, increasing")
     known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"
-    return Candidate(column, "", reason=known)
+    return ChannelCandidate(column, "", reason=known)
 
 
-def _of_text(column: Column) -> Candidate:
+def _of_text(column: FileColumn) -> ChannelCandidate:
     stamps = read_stamps(column.texts or ())
     count = len(column.texts or ())
     if not count or len(stamps.wrong) > 0.1 * count or not np.any(np.isfinite(stamps.values)):
-        return Candidate(column, "", reason="text")
+        return ChannelCandidate(column, "", reason="text")
     channel = "time" if stamps.has_clock else DATE
-    return Candidate(column, channel, 1, None, "dates and times of day as text")
+    return ChannelCandidate(column, channel, 1, None, "dates and times of day as text")
 
 
-def _is_clock(column: Column, *, steady: bool = False) -> bool:
+def _is_clock(column: FileColumn, *, steady: bool = False) -> bool:
     """Whether values increase, apart from a few returns and repeated values, or only decrease.
 
     A ``steady`` clock increases from row to row in most rows.
@@ -261,7 +265,7 @@ def _is_clock(column: Column, *, steady: bool = False) -> bool:
     return increases or bool(np.all(steps < 0))
 
 
-def _even_clock(choice: Choice) -> list[Candidate]:
+def _even_clock(choice: Choice) -> list[ChannelCandidate]:
     """The only column of an unknown name whose values increase evenly, in a file without a time."""
     found = [item for item in choice.unused if _increases_evenly(item)]
     if len(found) != 1:
@@ -270,12 +274,12 @@ def _even_clock(choice: Choice) -> list[Candidate]:
     return [replace(found[0], channel="time", rank=_BY_ORDER, reason="increases evenly")]
 
 
-def _counts_rows(item: Candidate) -> bool:
+def _counts_rows(item: ChannelCandidate) -> bool:
     """Whether a first column without a name is a number of the row and may be no time."""
     return item.rank == _BY_ORDER and bool(np.all(np.diff(item.column.values) == 1))
 
 
-def _increases_evenly(item: Candidate) -> bool:
+def _increases_evenly(item: ChannelCandidate) -> bool:
     """Whether an unnamed column may be a clock: whole numbers are counters as well."""
     values = item.column.values
     if item.unit is not None or item.column.texts is not None or len(values) < FEWEST:
@@ -286,7 +290,7 @@ def _increases_evenly(item: Candidate) -> bool:
     return not whole and bool(np.all(steps > 0) and np.ptp(steps) < _UNEVEN * np.median(steps))
 
 
-def _choose_times(table: Table, times: Sequence[Candidate], choice: Choice) -> None:
+def _choose_times(table: ColumnTable, times: Sequence[ChannelCandidate], choice: Choice) -> None:
     """One time column per group, or one before each block of channels of its own rate."""
     dates = [item for item in times if item.channel == DATE]
     clocks = [item for item in times if item.channel == "time"]
@@ -312,9 +316,9 @@ def _choose_times(table: Table, times: Sequence[Candidate], choice: Choice) -> N
     choice.unused += [replace(item, channel="", reason="date without use") for item in dates]
 
 
-def _blocks(table: Table, clocks: Sequence[Candidate]) -> list[list[Candidate]]:
+def _blocks(table: ColumnTable, clocks: Sequence[ChannelCandidate]) -> list[list[ChannelCandidate]]:
     """Time columns without another column between them are alternatives."""
-    blocks: list[list[Candidate]] = []
+    blocks: list[list[ChannelCandidate]] = []
     used = {item.column.number for item in clocks}
     for item in sorted(clocks, key=lambda c: c.column.number):
         before = blocks[-1][-1].column.number if blocks else 0
@@ -330,7 +334,7 @@ def _blocks(table: Table, clocks: Sequence[Candidate]) -> list[list[Candidate]]:
     return blocks
 
 
-def _quality(item: Candidate) -> tuple[bool, bool, bool, int]:
+def _quality(item: ChannelCandidate) -> tuple[bool, bool, bool, int]:
     """That of the source first, an absolute one, one with a unit, then the finest.
 
     All but the finest have distinct stamps that increase.
@@ -354,11 +358,11 @@ def _quality(item: Candidate) -> tuple[bool, bool, bool, int]:
     )
 
 
-def _needs_date(item: Candidate) -> bool:
+def _needs_date(item: ChannelCandidate) -> bool:
     return item.column.texts is not None and not read_stamps(item.column.texts[:50]).has_date
 
 
-def _choose_pose(poses: list[Candidate], body: str | None, choice: Choice) -> None:
+def _choose_pose(poses: list[ChannelCandidate], body: str | None, choice: Choice) -> None:
     """Pose channels of one body, where they are complete with those that are given."""
     if not poses:
         return

@@ -37,7 +37,7 @@ CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 @dataclass(frozen=True)
-class Ratio:
+class VelocityRatio:
     """Angle over the integral of the velocity, in the numbers of the file."""
 
     value: float
@@ -49,7 +49,7 @@ class Ratio:
         return abs(abs(self.value) / expected - 1) < _TOLERANCE
 
 
-def ratio_of(time: Array, angle: Array, velocity: Array) -> Ratio | None:
+def ratio_of(time: Array, angle: Array, velocity: Array) -> VelocityRatio | None:
     """Ratio of the change of an angle to the integral of a velocity.
 
     ``time`` (n,): any unit. ``angle``, ``velocity`` (n,): any units; NaN where missing. Returns:
@@ -74,7 +74,7 @@ def ratio_of(time: Array, angle: Array, velocity: Array) -> Ratio | None:
     correlation = float(np.sum(a * integral)) / norm
     if abs(correlation) < _CLEAR:
         return None
-    return Ratio(float(np.sum(a * integral) / np.sum(integral**2)), correlation)
+    return VelocityRatio(float(np.sum(a * integral) / np.sum(integral**2)), correlation)
 
 
 def likely_counts(estimate: float) -> int | None:
@@ -130,7 +130,11 @@ def beyond_rating(work: Work) -> None:
 
 
 def _apply_ratio(
-    work: Work, ratio: Ratio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
+    work: Work,
+    ratio: VelocityRatio,
+    angle: ChosenColumn,
+    velocity: ChosenColumn,
+    clock: ChosenColumn,
 ) -> None:
     if angle.factor is not None and velocity.factor is not None and clock.factor is not None:
         expected = velocity.factor * clock.factor / angle.factor
@@ -162,7 +166,7 @@ def _apply_ratio(
 
 
 def _matches(
-    ratio: Ratio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
+    ratio: VelocityRatio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
 ) -> Iterator[tuple[tuple[str, float], tuple[str, float], tuple[str, float]]]:
     """Combinations of units that agree with the ratio."""
     is_linear = angle.base == "position"

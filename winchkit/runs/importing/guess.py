@@ -27,12 +27,12 @@ from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
 from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
 from winchkit.runs.importing.stored.settling import settle_stored
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
 
 
-def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
+def guess_columns(table: ColumnTable, answers: Answers | None = None) -> Guess:
     """Guess what the columns of a table are."""
     answers = answers or Answers()
     if answers.axis is None and not answers.kind and (marker := marker_column(table)) is not None:
@@ -94,7 +94,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     )
 
 
-def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
+def _of_axes(table: ColumnTable, answers: Answers, by: str) -> Guess:
     """Assignments of a table in long form: those of its first axis, which hold for all."""
     axes = axes_of(table, by)
     guess = guess_columns(next(iter(axes.values())), replace(answers, axis=""))
@@ -102,7 +102,7 @@ def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
     return replace(guess, axis=by, whole=table, notes=(note, *guess.notes))
 
 
-def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:
+def _given(table: ColumnTable, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:
     """Answers by the unique name of their column; a question for a column that is not there."""
     found: dict[str, ColumnAnswer] = {}
     missing: list[Question] = []
@@ -125,7 +125,7 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
     return found, missing
 
 
-def _whole(item: ColumnAnswer, table: Table) -> ColumnAnswer:
+def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
     """An answer with its sign and factor as parts of its expression, which they are of a sum."""
     if table.column(item.source) is not None or not is_expression(item.source):
         return item
@@ -135,7 +135,7 @@ def _whole(item: ColumnAnswer, table: Table) -> ColumnAnswer:
 
 
 def _contradictions(
-    found: Mapping[str, ColumnAnswer], column: Column | None, item: ColumnAnswer
+    found: Mapping[str, ColumnAnswer], column: FileColumn | None, item: ColumnAnswer
 ) -> Iterator[Question]:
     """Questions for a column that is given twice, and for a channel of two columns."""
     if column is None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
 _MARKERS = frozenset(("marker id", "marker", "tag id", "tag", "aruco id", "fiducial id"))
 """Titles of a column that names the marker whose pose a row has."""
@@ -24,7 +24,7 @@ _CLOSER = 0.25
 Rows of one signal change more over several rows than over one: above 1 for a flag that toggles."""
 
 
-def axes_of(table: Table, by: str) -> dict[str, Table]:
+def axes_of(table: ColumnTable, by: str) -> dict[str, ColumnTable]:
     """The table of each axis, of a table in long form.
 
     ``table``: each row is of one axis. ``by``: name or number of the column that names the axis.
@@ -36,7 +36,7 @@ def axes_of(table: Table, by: str) -> dict[str, Table]:
     return {name: _of_rows(table, key, own) for name, own in rows.items()}
 
 
-def by_kind(table: Table, by: str) -> Table:
+def by_kind(table: ColumnTable, by: str) -> ColumnTable:
     """A table with columns of their own for each kind of row, and times of their own.
 
     ``table``: the rows of one kind have other quantities in the same columns than those of another.
@@ -63,7 +63,7 @@ def by_kind(table: Table, by: str) -> Table:
     )
 
 
-def has_kinds(table: Table, key: Column) -> bool:
+def has_kinds(table: ColumnTable, key: FileColumn) -> bool:
     """Whether the rows of some value of a column lack a column that those of another have."""
     names = _names(key)
     if names is None:
@@ -75,7 +75,9 @@ def has_kinds(table: Table, key: Column) -> bool:
     )
 
 
-def _rows_of(table: Table, by: str, what: str) -> tuple[Column, dict[str, NDArray[np.intp]]]:
+def _rows_of(
+    table: ColumnTable, by: str, what: str
+) -> tuple[FileColumn, dict[str, NDArray[np.intp]]]:
     """The column that names the axis or kind of each row, and the rows of each."""
     key = table.column(by)
     if key is None:
@@ -93,7 +95,7 @@ def _rows_of(table: Table, by: str, what: str) -> tuple[Column, dict[str, NDArra
     return key, {name: np.flatnonzero(names == name) for name in found}
 
 
-def marker_column(table: Table) -> Column | None:
+def marker_column(table: ColumnTable) -> FileColumn | None:
     """The column that names the marker of each row, of several markers of a camera."""
     for column in table.columns:
         names = _names(column) if words_of(column.name) in _MARKERS else None
@@ -102,7 +104,7 @@ def marker_column(table: Table) -> Column | None:
     return None
 
 
-def likely_axis(table: Table) -> Column | None:
+def likely_axis(table: ColumnTable) -> FileColumn | None:
     """The column that names the axis of each row, where there seems to be one.
 
     Its few values alternate, and another column changes far less from row to row of one axis than
@@ -125,7 +127,7 @@ def likely_axis(table: Table) -> Column | None:
     return None
 
 
-def _names(column: Column) -> NDArray[np.str_] | None:
+def _names(column: FileColumn) -> NDArray[np.str_] | None:
     """Axis of each row, empty where it has none; None for numbers that name nothing."""
     if column.texts is not None:
         return np.array([text.strip() for text in column.texts], dtype=np.str_)
@@ -151,7 +153,7 @@ def _is_closer(values: Array, codes: NDArray[np.intp]) -> bool:
     return float(np.nanmean(within)) < _CLOSER * float(np.nanmean(between))
 
 
-def _of_rows(table: Table, key: Column, rows: NDArray[np.intp]) -> Table:
+def _of_rows(table: ColumnTable, key: FileColumn, rows: NDArray[np.intp]) -> ColumnTable:
     def line_of(row: int) -> int | None:
         return table.line_of(int(rows[row]))
 

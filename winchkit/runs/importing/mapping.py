@@ -13,7 +13,7 @@ from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.long_table import axes_of, by_kind
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 from winchkit.schema.file_text import file_text
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
@@ -63,7 +63,7 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
     write_whole(path, file_text("mapping", mapping).encode())
 
 
-def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
+def guess_by(whole: ColumnTable, mapping: ImportMapping) -> Guess:
     """Assignments of a table by a mapping.
 
     ``mapping``: its first log whose columns the file has is used; of logs with the same columns the
@@ -107,7 +107,7 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     )
 
 
-def _fitting(whole: Table, mapping: ImportMapping) -> list[MappedLog]:
+def _fitting(whole: ColumnTable, mapping: ImportMapping) -> list[MappedLog]:
     """Logs whose columns a file has, the one that is used first."""
     logs = [
         log
@@ -130,7 +130,7 @@ def _names(log: MappedLog) -> list[str]:
     return [item.source for item in log.column] + [log.axis] * bool(log.axis)
 
 
-def _lacking(table: Table, log: MappedLog, mapping: ImportMapping) -> str:
+def _lacking(table: ColumnTable, log: MappedLog, mapping: ImportMapping) -> str:
     names = _names(log)
     lacking = [repr(name) for name in names if table.column(name) is None]
     has = ", ".join(repr(column.source) for column in table.columns[:20])

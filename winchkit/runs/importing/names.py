@@ -21,7 +21,7 @@ CURRENT = "current"
 
 
 @dataclass(frozen=True)
-class Meaning:
+class NamedChannel:
     """Channel that a name stands for."""
 
     channel: str
@@ -219,7 +219,7 @@ def words_of(name: str) -> str:
     return " ".join(re.split(r"[^a-z0-9]+", text)).strip()
 
 
-def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
+def meaning_of(name: str, labels: tuple[str, ...] = ()) -> NamedChannel | None:
     """Channel that a name stands for; None for an unknown name.
 
     ``name``: name without unit; the name of a channel of winchkit stands for it. Returns: a column
@@ -228,12 +228,12 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
     # "position" and "force" are words of any recorder, and no names of channels alone.
     is_word = name.rpartition(".")[2] in ROTARY
     if (column_dimension(name) is not None and not is_word) or name == "time":
-        return Meaning(name, 0, name)
+        return NamedChannel(name, 0, name)
     words = words_of(name)
     if matrix := _MATRIX.match(words):
         row, column = int(matrix[1]), int(matrix[2])
         channel = f"platform_{'xyz'[row - 1]}" if column == 4 else f"platform_r{row}{column}"
-        return Meaning(channel, 1, name)
+        return NamedChannel(channel, 1, name)
     whole = words_of(" ".join((*labels, name)))
     # The last part of a name with dots or slashes (MAT, HDF5, ROS), where the whole says nothing.
     last = words_of(re.split(r"[./]", name)[-1])
@@ -242,7 +242,7 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
     for text in dict.fromkeys((_axis_of(labels, words), variable, words, whole, last)):
         for pattern, rank, channel in _COMPILED:
             if text and (found := pattern.search(text)):
-                return Meaning(channel, rank, found[0])
+                return NamedChannel(channel, rank, found[0])
     return None
 
 

@@ -16,7 +16,7 @@ from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
 from winchkit.runs.importing.assignment import ChosenColumn, Question, Work
 from winchkit.runs.importing.formats.header import VICON
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Column
+from winchkit.runs.importing.table import FileColumn
 from winchkit.schema.mapping import ANGLES, EULER, MATRIX, POSITION, QUATERNION, VECTOR
 
 _OPEN = re.compile(r"(a )?r(ot|vec)? ?[xyz]")
@@ -135,13 +135,13 @@ _KIND_OF_BODY = re.compile(r"^Global Angle( \(\w+\))? ")
 """What Vicon writes before the name of an object."""
 
 
-def is_turned_axis(column: Column) -> bool:
+def is_turned_axis(column: FileColumn) -> bool:
     """Whether a column is one of X, Y and Z below the word ``Rotation``."""
     above = words_of(" ".join(column.labels))
     return words_of(column.name) in {"x", "y", "z"} and any(word in above for word in _TURNS)
 
 
-def body_of(column: Column) -> str:
+def body_of(column: FileColumn) -> str:
     """Body or marker of a tracker that a column belongs to; empty without labels.
 
     Returns: labels without words such as ``Rigid Body`` and ``Position``.
@@ -152,7 +152,7 @@ def body_of(column: Column) -> str:
 
 
 def chosen_body(
-    columns: Sequence[Column], wanted: str | None
+    columns: Sequence[FileColumn], wanted: str | None
 ) -> tuple[str | None, tuple[str, ...]]:
     """Body whose pose is imported.
 

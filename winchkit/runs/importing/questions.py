@@ -14,7 +14,7 @@ from winchkit.runs.importing.assignment import (
     is_whole,
 )
 from winchkit.runs.importing.long_table import axes_of, has_kinds
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_settling import is_alike
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.schema.mapping import DATE
@@ -52,7 +52,7 @@ _OTHER_UNITS = {
 """Units of a drive and of an amplifier, for which a constant is asked then."""
 
 
-def axis_question(table: Table, key: Column) -> Question:
+def axis_question(table: ColumnTable, key: FileColumn) -> Question:
     """Question whether a column names the axis or the kind of each row."""
     by = key.source
     names = ", ".join(list(axes_of(table, by))[:_SHOWN])

@@ -12,7 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.assemble import Recording, assemble, refuse
+from winchkit.runs.assemble import RawColumns, assemble, refuse
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
@@ -169,7 +169,7 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     def line_of(row: int) -> int | None:
         return streams.line_of(int(rows[row])) if rows is not None else None
 
-    recording = Recording(streams.path, header, columns, line_of, texts, notes=streams.notes)
+    recording = RawColumns(streams.path, header, columns, line_of, texts, notes=streams.notes)
     try:
         return assemble(recording)
     except RunError as error:

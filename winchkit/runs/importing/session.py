@@ -18,7 +18,7 @@ from winchkit.runs.importing.mapping import guess_by, mapping_id, mapping_of
 from winchkit.runs.importing.pieces import jumps_of, pieces_of
 from winchkit.runs.importing.runs import has_angle, metadata_of, run_of, with_angle
 from winchkit.runs.importing.streams import Streams, streams_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.run import Run
 from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
@@ -105,7 +105,7 @@ def import_runs(
 
 
 def guesses_of(
-    tables: Sequence[Table],
+    tables: Sequence[ColumnTable],
     answers: Answers,
     mapping: ImportMapping | None = None,
     ask: Ask | None = None,
@@ -148,7 +148,7 @@ def guesses_of(
 
 
 def _with_one_motion(
-    guesses: list[Guess], tables: Sequence[Table], answers: Answers
+    guesses: list[Guess], tables: Sequence[ColumnTable], answers: Answers
 ) -> list[Guess]:
     """Assignments by the motion that all files together have.
 
@@ -174,7 +174,7 @@ def _with_one_motion(
     ]
 
 
-def _with_own_times(tables: Sequence[Table], answers: Answers) -> list[Table]:
+def _with_own_times(tables: Sequence[ColumnTable], answers: Answers) -> list[ColumnTable]:
     """Files with times beside others that have none, of which a sample rate is."""
     if not answers.sample_rate or len(tables) < 2:
         return []

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.runs.importing.assignment import Work
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 
 SOURCE_STAMP, LOG_TIME = "header.stamp", "log_time"
 """Names of the columns of a topic."""
@@ -20,7 +20,7 @@ def has_two_clocks(work: Work) -> bool:
     return names == {SOURCE_STAMP, LOG_TIME}
 
 
-def without_stamps(table: Table) -> tuple[Table, str]:
+def without_stamps(table: ColumnTable) -> tuple[ColumnTable, str]:
     """The table with log times only, and a note."""
     groups = {item.group for item in table.columns if item.name == SOURCE_STAMP}
     bare = {item.group for item in table.columns} - groups

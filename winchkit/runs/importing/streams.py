@@ -21,7 +21,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.orientation import rotation_as
 from winchkit.runs.importing.stored.numbers import range_of, restored
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP
 
 _PADDED = 0.67
@@ -177,7 +177,7 @@ def _of_axes(guess: Guess) -> Streams:
 
 
 def _cell_faults(
-    table: Table, columns: dict[str, Column], used: dict[str, Assignment]
+    table: ColumnTable, columns: dict[str, FileColumn], used: dict[str, Assignment]
 ) -> list[Fault]:
     found = []
     for source, column in columns.items():
@@ -199,7 +199,7 @@ def _cell_faults(
     return found
 
 
-def _no_times(table: Table, source: str, wrong: Sequence[tuple[int, str]]) -> Fault:
+def _no_times(table: ColumnTable, source: str, wrong: Sequence[tuple[int, str]]) -> Fault:
     """Fault of a column of text that is given as the time and has neither numbers nor stamps."""
     grouped = [(row, text) for row, text in wrong if _THOUSANDS.fullmatch(text)]
     row, text = (grouped or [*wrong])[0]
@@ -209,7 +209,9 @@ def _no_times(table: Table, source: str, wrong: Sequence[tuple[int, str]]) -> Fa
     return Fault(message, table.path, table.line_of(row))
 
 
-def _clock(column: Column, item: Assignment, day: Column | None) -> tuple[float, Array, bool]:
+def _clock(
+    column: FileColumn, item: Assignment, day: FileColumn | None
+) -> tuple[float, Array, bool]:
     """First stamp, s; times from it, s; and whether the first one counts from 1970."""
     if item.unit == STAMP:
         stamps = read_stamps(column.texts or ())
@@ -231,7 +233,7 @@ def _clock(column: Column, item: Assignment, day: Column | None) -> tuple[float,
     return first, values - first, absolute
 
 
-def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
+def _clock_of(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn | None:
     own = [item for item in clocks if item.group == column.group]
     before = [item for item in own if item.number < column.number]
     return before[-1] if before else own[0] if own else None

@@ -17,7 +17,7 @@ LARGEST = 1 << 30
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class FileColumn:
     """One column of a file, in the unit of the file."""
 
     name: str
@@ -42,7 +42,7 @@ class Column:
     def __len__(self) -> int:
         return len(self.values)
 
-    def at(self, rows: NDArray[np.intp]) -> Column:
+    def at(self, rows: NDArray[np.intp]) -> FileColumn:
         """The same column at some of its rows, shape (m,)."""
         place = {int(row): number for number, row in enumerate(rows)}
         texts = self.texts
@@ -55,13 +55,13 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class ColumnTable:
     """Content of a file."""
 
     path: str
     layout: str
     """Description of the format, e.g. ``text in UTF-16, semicolons, decimal comma``."""
-    columns: tuple[Column, ...]
+    columns: tuple[FileColumn, ...]
     line_of: Callable[[int], int | None] = lambda _row: None
     """Line of the file of a row; None where the format has no lines."""
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class Table:
     interval: float | None = None
     """Sampling interval that the file declares, s."""
 
-    def column(self, source: str) -> Column | None:
+    def column(self, source: str) -> FileColumn | None:
         """The column of a unique name, or of a number where no column has that name."""
         found = next((item for item in self.columns if item.source == source), None)
         if found is None and source.isdecimal():
@@ -81,7 +81,7 @@ class Table:
         return found
 
 
-def named_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
+def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
     """Columns with numbers and unique names in ``source``.
 
     ``columns``: in the order of the file. Returns: else with its labels before it, and with ``#2``

@@ -11,7 +11,7 @@ from winchkit.arrays import Array
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import ColumnAnswer
 from winchkit.runs.importing.assignment import (
-    Candidate,
+    ChannelCandidate,
     ChosenColumn,
     Confidence,
     Work,
@@ -21,7 +21,7 @@ from winchkit.runs.importing.assignment import (
 from winchkit.runs.importing.consistency import CLOCKS
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNT_RATE,
@@ -49,7 +49,7 @@ _COARSE = 0.01
 """0.01 rad is 0.6 deg: too coarse for a resolver or encoder, and usual for degrees."""
 
 
-def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> ChosenColumn:
+def started(work: Work, candidate: ChannelCandidate, answer: ColumnAnswer | None) -> ChosenColumn:
     """A column with the unit that the user or the file gives."""
     if answer is not None and answer.unit:
         candidate = replace(candidate, unit=read_unit(answer.unit))
@@ -166,7 +166,7 @@ def _settle_current(
         item.settle(constant * unit.factor, unit.text, origin, text)
 
 
-def _gain(table: Table) -> float | None:
+def _gain(table: ColumnTable) -> float | None:
     """Torque constant among the variables of the file."""
     found = {
         value
@@ -268,7 +268,7 @@ def _is_in_steps(values: Array) -> bool:
     return bool(np.all(np.abs(steps - np.round(steps)) < 1e-6 * np.maximum(1.0, np.abs(steps))))
 
 
-def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
+def _declared(table: ColumnTable, dimension: str | None) -> SpelledUnit | None:
     """Unit of a dimension that is declared above the header: ``Length Units, Millimeters``."""
     if dimension not in {"length", "angle", "force", "torque"}:
         return None
@@ -282,13 +282,13 @@ def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
     return None
 
 
-def _is_si(table: Table, name: str) -> bool:
+def _is_si(table: ColumnTable, name: str) -> bool:
     """Whether a name or a format has SI units by convention."""
     words = words_of(name).split()
     return table.layout in _SI_LAYOUTS or bool(set(words) & _SI_WORDS) or _is_of_ros(table)
 
 
-def _is_of_ros(table: Table) -> bool:
+def _is_of_ros(table: ColumnTable) -> bool:
     """Whether a table is of messages of ROS, which are in SI units (REP 103).
 
     Their topics have slashes, and the torques of its JointState are efforts.

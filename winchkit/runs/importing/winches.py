@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.runs.importing.assignment import Candidate, Choice, Question
+from winchkit.runs.importing.assignment import ChannelCandidate, Choice, Question
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Column
+from winchkit.runs.importing.table import FileColumn
 from winchkit.schema.mapping import DATE
 
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
@@ -21,7 +21,9 @@ FEWEST = 20
 """Values of a column below which that they are equal or increase evenly may be chance."""
 
 
-def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collection[str]) -> None:
+def choose_channels(
+    others: Sequence[ChannelCandidate], choice: Choice, without: Collection[str]
+) -> None:
     """Choose one column for each channel of each winch.
 
     What the user says of a column of one winch holds for those of the others that are named alike.
@@ -32,7 +34,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
     # A channel without a winch's name that the user gives: the file is of one winch.
     is_of_one = any(item.channel in (*_SINGLE, *_MOVING, *_LINEAR) for item in given)
     labels = () if is_of_one else _winch_labels(others, given)
-    by_channel: dict[str, list[Candidate]] = {}
+    by_channel: dict[str, list[ChannelCandidate]] = {}
     for item in others:
         label = _label_of(item, labels)
         channel = _channel_as_given(item, label, given) if label else item.channel
@@ -85,7 +87,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
         ]
 
 
-def stem_of(column: Column, channel: str) -> tuple[str, ...]:
+def stem_of(column: FileColumn, channel: str) -> tuple[str, ...]:
     """Words of a column's name, with ``*`` for the name of its winch.
 
     ``channel``: with the name of its winch, ``1.motor_angle``.
@@ -95,7 +97,7 @@ def stem_of(column: Column, channel: str) -> tuple[str, ...]:
     return tuple("*" if label and word == label else word for word in words)
 
 
-def _is_as_given(item: Candidate, channel: str, given: Sequence[Candidate]) -> bool:
+def _is_as_given(item: ChannelCandidate, channel: str, given: Sequence[ChannelCandidate]) -> bool:
     """Whether a column is named like the one that the user gives for the channel of a winch."""
     base = channel.rpartition(".")[2]
     label = channel.rpartition(".")[0]
@@ -107,7 +109,7 @@ def _is_as_given(item: Candidate, channel: str, given: Sequence[Candidate]) -> b
     )
 
 
-def _channel_as_given(item: Candidate, label: str, given: Sequence[Candidate]) -> str:
+def _channel_as_given(item: ChannelCandidate, label: str, given: Sequence[ChannelCandidate]) -> str:
     """Channel that the user gives to a column of another winch that is named alike."""
     stem = stem_of(item.column, f"{label}.{item.channel}")
     for other in given:
@@ -118,7 +120,9 @@ def _channel_as_given(item: Candidate, label: str, given: Sequence[Candidate]) -
 
 
 def _leave_constant(
-    by_channel: Mapping[str, list[Candidate]], given: Sequence[Candidate], choice: Choice
+    by_channel: Mapping[str, list[ChannelCandidate]],
+    given: Sequence[ChannelCandidate],
+    choice: Choice,
 ) -> None:
     """Leave out constant columns of a motor whose angle or velocity varies.
 
@@ -139,12 +143,14 @@ def _leave_constant(
                 choice.unused.append(replace(item, channel="", reason="constant while it moves"))
 
 
-def _is_constant(item: Candidate) -> bool:
+def _is_constant(item: ChannelCandidate) -> bool:
     values = item.column.values[np.isfinite(item.column.values)]
     return len(values) >= FEWEST and bool(np.all(values == values[0]))
 
 
-def _named_alike(best: Sequence[Candidate], given: Sequence[Candidate]) -> Candidate | None:
+def _named_alike(
+    best: Sequence[ChannelCandidate], given: Sequence[ChannelCandidate]
+) -> ChannelCandidate | None:
     """Of equal candidates the one that has the most words of the columns that the user gives."""
     words = {word for item in given for word in _words(item)}
     shared = [len(words & set(_words(item))) for item in best]
@@ -154,7 +160,9 @@ def _named_alike(best: Sequence[Candidate], given: Sequence[Candidate]) -> Candi
     return best[shared.index(most)]
 
 
-def _winch_labels(others: Sequence[Candidate], given: Sequence[Candidate]) -> tuple[str, ...]:
+def _winch_labels(
+    others: Sequence[ChannelCandidate], given: Sequence[ChannelCandidate]
+) -> tuple[str, ...]:
     """Words that distinguish equal columns of several winches: ``1 2 3``, ``a b``; else none.
 
     The columns of most labels whose names differ in one word only; none where two sets of labels
@@ -187,7 +195,7 @@ def _winch_labels(others: Sequence[Candidate], given: Sequence[Candidate]) -> tu
     return ()
 
 
-def _base_of(item: Candidate) -> str:
+def _base_of(item: ChannelCandidate) -> str:
     """Channel without a winch's name; a current is in place of the torque."""
     base = item.channel.rpartition(".")[2]
     return "motor_torque" if base == "motor_current" else base
@@ -200,10 +208,10 @@ def _is_series(labels: Sequence[str]) -> bool:
     return numbered or all(len(label) == 1 for label in labels) or set(labels) in _SIDES
 
 
-def _words(item: Candidate) -> list[str]:
+def _words(item: ChannelCandidate) -> list[str]:
     return words_of(" ".join((*item.column.labels, item.column.name))).split()
 
 
-def _label_of(item: Candidate, labels: Sequence[str]) -> str:
+def _label_of(item: ChannelCandidate, labels: Sequence[str]) -> str:
     found = [label for label in labels if label in _words(item)]
     return found[0] if len(found) == 1 else ""

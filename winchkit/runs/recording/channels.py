@@ -28,7 +28,7 @@ from winchkit.runs.formats.mcap_file import (
     message_name,
 )
 from winchkit.runs.formats.mcap_records import pack_messages
-from winchkit.runs.layout import Layout, Samples, write_layout
+from winchkit.runs.layout import Layout, SourceSamples, write_layout
 from winchkit.runs.recording.log_file import require_in_place
 from winchkit.runs.recording.writer import LogWriter
 
@@ -80,7 +80,7 @@ class ChannelLog(LogWriter):
             layout = write_layout(replace(self._layout, rule=rule))
             self._file.put_metadata(LOG, {"layout": layout, **about})
 
-    def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
+    def _put(self, pieces: Mapping[str, SourceSamples], now: float) -> None:
         content = [self._message_block(topic, samples) for topic, samples in pieces.items()]
         self._put_chunk([*content, *self._waiting])
         if self._aligner.start is None:
@@ -128,7 +128,7 @@ class ChannelLog(LogWriter):
             with self._writing():
                 self._file.put_chunk(content)
 
-    def _message_block(self, topic: str, samples: Samples) -> bytes:
+    def _message_block(self, topic: str, samples: SourceSamples) -> bytes:
         known = np.isfinite(samples.times)
         times, received = samples.times[known], samples.received[known]
         values = np.ascontiguousarray(samples.values[known], dtype="<f8")

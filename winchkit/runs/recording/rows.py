@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.runs.align import Aligner
-from winchkit.runs.layout import Layout, Samples
+from winchkit.runs.layout import Layout, SourceSamples
 from winchkit.runs.recording.writer import LogWriter
 from winchkit.runs.run_writer import RunWriter
 from winchkit.runs.writer import kind_for
@@ -44,7 +44,7 @@ class RowLog(LogWriter):
         self._event = time, event
         self._events.append(self._event)
 
-    def _put(self, pieces: Mapping[str, Samples], now: float) -> None:
+    def _put(self, pieces: Mapping[str, SourceSamples], now: float) -> None:
         for topic, samples in pieces.items():
             self._aligner.add(topic, samples.times, samples.values)
         self._newest = now

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from winchkit.errors import UsageError
-from winchkit.runs.layout import Layout, Samples
+from winchkit.runs.layout import Layout, SourceSamples
 from winchkit.runs.recording.log_file import begin_log, create
 from winchkit.runs.recording.rotation import Rotation, part_path
 
@@ -41,7 +41,7 @@ class LogWriter(ABC):
         first = part_path(path, 1) if rotation else path
         self._put_part(1, first, begin_log(path, first, replace=replace))
 
-    def write(self, pieces: Mapping[str, Samples], now: float) -> None:
+    def write(self, pieces: Mapping[str, SourceSamples], now: float) -> None:
         """Write samples by topic, and flush them to the operating system."""
         if self._rotation and self._rotation.due(self._size(), now - self._began):
             self._close_part({})
@@ -86,7 +86,7 @@ class LogWriter(ABC):
     def _open_part(self, path: Path, stream: BinaryIO, about: Mapping[str, str]) -> None: ...
 
     @abstractmethod
-    def _put(self, pieces: Mapping[str, Samples], now: float) -> None: ...
+    def _put(self, pieces: Mapping[str, SourceSamples], now: float) -> None: ...
 
     @abstractmethod
     def _close_part(self, end: Mapping[str, str]) -> None: ...

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
-from winchkit.schema.eds.repair import Findings, Section, canonical, canonical_key, mend
+from winchkit.schema.eds.repair import EdsFindings, Section, canonical, canonical_key, mend
 from winchkit.schema.eds.xdd import read_xml
 
 SUFFIXES = (".eds", ".dcf", ".xdd", ".xdc")
@@ -45,7 +45,7 @@ def read_eds_text(path: str | Path) -> EdsText:
     Returns: valid text, and a warning per repair. Raises FileError with every line that cannot be
     repaired.
     """
-    findings = Findings(str(path))
+    findings = EdsFindings(str(path))
     sections = _sections(_text(Path(path), findings), findings)
     if findings.faults:
         raise FileError(findings.faults)
@@ -60,7 +60,7 @@ def read_eds_text(path: str | Path) -> EdsText:
     return EdsText(str(path), _written(mended), tuple(findings.warnings), lines)
 
 
-def _text(path: Path, findings: Findings) -> str:
+def _text(path: Path, findings: EdsFindings) -> str:
     try:
         with open(path, "rb", opener=regular) as stream:
             data = stream.read(_LARGEST + 1)
@@ -80,7 +80,7 @@ def _text(path: Path, findings: Findings) -> str:
         return data.decode("latin-1")
 
 
-def _sections(text: str, findings: Findings) -> list[Section]:
+def _sections(text: str, findings: EdsFindings) -> list[Section]:
     """Split into sections; the first of two equal ones is kept."""
     found: dict[str, Section] = {}
     is_xml = text.lstrip().startswith("<")
@@ -90,7 +90,7 @@ def _sections(text: str, findings: Findings) -> list[Section]:
     return [section for section in found.values() if not section.contradicts]
 
 
-def _text_sections(text: str, findings: Findings) -> list[Section]:
+def _text_sections(text: str, findings: EdsFindings) -> list[Section]:
     """Sections of CiA 306 in the order of the file."""
     sections: list[Section] = []
     for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
@@ -115,7 +115,7 @@ def _text_sections(text: str, findings: Findings) -> list[Section]:
     return sections
 
 
-def _take_key(section: Section, number: int, line: str, findings: Findings) -> None:
+def _take_key(section: Section, number: int, line: str, findings: EdsFindings) -> None:
     key, equals, value = (part.strip() for part in line.partition("="))
     if not equals or not key:
         findings.warn(number, f"{line!r} is neither a section nor key=value; left out")
@@ -154,7 +154,7 @@ def _append(section: Section, value: str, line: int) -> None:
     section.values[free], section.lines[free] = value, line
 
 
-def _keep_first(found: dict[str, Section], section: Section, findings: Findings) -> None:
+def _keep_first(found: dict[str, Section], section: Section, findings: EdsFindings) -> None:
     """Keep the first of two sections of one name; an ambiguous difference is a fault."""
     first = found.setdefault(section.name.casefold(), section)
     if first is section:

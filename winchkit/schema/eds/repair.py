@@ -85,7 +85,7 @@ class Section:
 
 
 @dataclass
-class Findings:
+class EdsFindings:
     """Faults and warnings of one file, as they are found."""
 
     path: str
@@ -150,7 +150,7 @@ _LAST_STANDARD = 0x1B
 _ACCESS = ("ro", "rw", "wo", "const", "rwr", "rww")
 
 
-def mend(sections: list[Section], findings: Findings) -> list[Section]:
+def mend(sections: list[Section], findings: EdsFindings) -> list[Section]:
     """Sections in an order and a state that any reader of EDS files accepts."""
     by_name = {section.name: section for section in sections}
     _mend_device(by_name, findings)
@@ -197,7 +197,7 @@ def _number(text: str) -> int | None:
         return None
 
 
-def _read_number(section: Section, key: str, text: str, findings: Findings) -> int | None:
+def _read_number(section: Section, key: str, text: str, findings: EdsFindings) -> int | None:
     """As ``_number``, with a warning where a leading zero makes another number of it."""
     value, bare = _number(text), text.replace(" ", "")
     if value is not None and _ZEROS.match(bare) and value != int(bare):
@@ -209,7 +209,7 @@ def _read_number(section: Section, key: str, text: str, findings: Findings) -> i
     return value
 
 
-def _without_zeros(section: Section, keys: Iterable[str], findings: Findings) -> None:
+def _without_zeros(section: Section, keys: Iterable[str], findings: EdsFindings) -> None:
     """Write numbers with leading zeros (``0004``), which readers of EDS files refuse, without."""
     for key in keys:
         text = section.values.get(key, "")
@@ -217,7 +217,7 @@ def _without_zeros(section: Section, keys: Iterable[str], findings: Findings) ->
             section.values[key] = str(value)
 
 
-def _mend_device(sections: dict[str, Section], findings: Findings) -> None:
+def _mend_device(sections: dict[str, Section], findings: EdsFindings) -> None:
     for name in ("FileInfo", "DeviceInfo"):
         if name not in sections:
             findings.warn(1, f"[{name}] is missing")
@@ -232,7 +232,7 @@ def _mend_device(sections: dict[str, Section], findings: Findings) -> None:
     _without_zeros(info, _NUMBERS, findings)
 
 
-def _mend_dummies(sections: dict[str, Section], findings: Findings) -> None:
+def _mend_dummies(sections: dict[str, Section], findings: EdsFindings) -> None:
     dummies = sections.get("DummyUsage")
     if dummies is None:
         return
@@ -246,13 +246,13 @@ def _mend_dummies(sections: dict[str, Section], findings: Findings) -> None:
         _without_zeros(dummies, [key], findings)
 
 
-def _stand_in(index: int, member: Section, findings: Findings) -> Section:
+def _stand_in(index: int, member: Section, findings: EdsFindings) -> Section:
     findings.warn(member.line, f"[{member.name}] has no [{index:04X}]; taken as part of a record")
     values = {"ParameterName": f"Object {index:04X}h", "ObjectType": hex(_RECORD)}
     return Section(f"{index:04X}", member.line, values)
 
 
-def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Findings) -> None:
+def _mend_object(section: Section, subs: dict[int, list[Section]], findings: EdsFindings) -> None:
     index = section.index
     if index is None:
         return
@@ -284,13 +284,13 @@ def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Fin
         _check_count(section, len(members), findings)
 
 
-def _mend_name(section: Section, findings: Findings) -> None:
+def _mend_name(section: Section, findings: EdsFindings) -> None:
     if not section.values.get("ParameterName"):
         findings.warn(section.line, f"[{section.name}] has no ParameterName")
         section.values["ParameterName"] = f"Object {section.name}"
 
 
-def _check_count(section: Section, found: int, findings: Findings) -> None:
+def _check_count(section: Section, found: int, findings: EdsFindings) -> None:
     text = section.values.get("SubNumber")
     if text is None:
         return
@@ -301,7 +301,7 @@ def _check_count(section: Section, found: int, findings: Findings) -> None:
         )
 
 
-def _mend_variable(section: Section, findings: Findings) -> None:
+def _mend_variable(section: Section, findings: EdsFindings) -> None:
     _without_zeros(section, ("DataType", "PDOMapping"), findings)
     kind = _mend_type(section, findings)
     access = section.values.get("AccessType", "").lower()
@@ -321,7 +321,7 @@ def _mend_variable(section: Section, findings: Findings) -> None:
         _mend_numbers(section, _BITS[kind], kind in _SIGNED, findings)
 
 
-def _mend_type(section: Section, findings: Findings) -> int:
+def _mend_type(section: Section, findings: EdsFindings) -> int:
     text = section.values.get("DataType")
     kind = _number(text or "")
     if kind is None:
@@ -339,7 +339,7 @@ def _mend_type(section: Section, findings: Findings) -> int:
     return kind
 
 
-def _mend_numbers(section: Section, bits: int, signed: bool, findings: Findings) -> None:
+def _mend_numbers(section: Section, bits: int, signed: bool, findings: EdsFindings) -> None:
     """Default, value and limits of a whole number, as a number of the object's own type.
 
     Hexadecimal numbers of signed objects may be the bits of a negative one (CiA 306).
@@ -364,7 +364,7 @@ def _mend_numbers(section: Section, bits: int, signed: bool, findings: Findings)
                 section.values[key] = str(kept)
 
 
-def _mend_node_id(section: Section, node: int | None, findings: Findings) -> None:
+def _mend_node_id(section: Section, node: int | None, findings: EdsFindings) -> None:
     """A value of one node, of an object whose default follows the node's number.
 
     ``node``: number of [DeviceComissioning]; None where it is not given.
@@ -390,7 +390,7 @@ def _of_type(value: int, bits: int, signed: bool) -> int:
     return value - (1 << bits) if signed and value >> bits - 1 else value
 
 
-def _names(sections: dict[str, Section], owner: Section, findings: Findings) -> list[Section]:
+def _names(sections: dict[str, Section], owner: Section, findings: EdsFindings) -> list[Section]:
     names = sections.get(f"{owner.name}Name")
     if names is None:
         return []
@@ -404,7 +404,7 @@ def _names(sections: dict[str, Section], owner: Section, findings: Findings) -> 
 
 
 def _check_lists(
-    sections: dict[str, Section], objects: dict[int, Section], findings: Findings
+    sections: dict[str, Section], objects: dict[int, Section], findings: EdsFindings
 ) -> None:
     listed: set[int] = set()
     for name in _LISTS:
@@ -419,7 +419,7 @@ def _check_lists(
             findings.warn(section.line, f"[{section.name}] is in no list of objects")
 
 
-def _check_list(section: Section, objects: dict[int, Section], findings: Findings) -> set[int]:
+def _check_list(section: Section, objects: dict[int, Section], findings: EdsFindings) -> set[int]:
     listed: set[int] = set()
     entries = {key: text for key, text in section.values.items() if key.isdigit()}
     for key, text in entries.items():

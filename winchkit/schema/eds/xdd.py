@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from winchkit.schema.eds.repair import MANDATORY, Findings, Section
+from winchkit.schema.eds.repair import MANDATORY, EdsFindings, Section
 
 _ROOT = "ISO15745ProfileContainer"
 _OBJECT = {
@@ -67,7 +67,7 @@ class _Parameter:
     values: dict[str, str] = field(default_factory=dict)
 
 
-def read_xml(text: str, findings: Findings) -> list[Section]:
+def read_xml(text: str, findings: EdsFindings) -> list[Section]:
     """Sections of an XDD or XDC; faults and warnings are added to ``findings``."""
     elements = _elements(text, findings)
     if not elements:
@@ -111,7 +111,7 @@ def _set(section: Section, element: _Element, values: dict[str, str]) -> None:
     section.lines |= dict.fromkeys(values, element.line)
 
 
-def _elements(text: str, findings: Findings) -> list[_Element]:
+def _elements(text: str, findings: EdsFindings) -> list[_Element]:
     """Elements in the order of the file; none where it is not well-formed."""
     found: list[_Element] = []
     open_ones: list[_Element] = []
@@ -166,7 +166,7 @@ def _parameters(elements: list[_Element]) -> dict[str, _Parameter]:
 
 
 def _object(
-    name: str, one: _Element, parameters: dict[str, _Parameter], findings: Findings
+    name: str, one: _Element, parameters: dict[str, _Parameter], findings: EdsFindings
 ) -> Section:
     """Section of an object; its own attributes count before those of its parameter."""
     own = {_OBJECT[key]: value for key, value in one.attributes.items() if key in _OBJECT}

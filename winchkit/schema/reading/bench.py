@@ -13,7 +13,7 @@ from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.reading.lines import Key
-from winchkit.schema.reading.parts import Reading
+from winchkit.schema.reading.parts import FileReading
 from winchkit.schema.reading.source import spelled
 from winchkit.schema.reading.tables import marker_at
 from winchkit.schema.robot_bench import RobotWiring
@@ -44,7 +44,7 @@ _FITTING = {
 
 
 def bench(
-    reading: Reading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
+    reading: FileReading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
 ) -> BenchSpec | None:
     """Read a bench and check its references."""
     for key in tree.keys() & {"path", "latch_file", "cells"}:
@@ -69,7 +69,7 @@ def bench(
     return spec
 
 
-def _with_cells(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+def _with_cells(reading: FileReading, tree: dict[str, Any]) -> dict[str, Any]:
     """The tree with its winches as cells, where none of them has a drive."""
     winches = tree.get("winch")
     if not isinstance(winches, dict) or not winches:
@@ -90,7 +90,7 @@ def _with_cells(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
     return {**tree, "winch": {}, "cells": known}
 
 
-def _check_deviations(reading: Reading, spec: BenchSpec) -> None:
+def _check_deviations(reading: FileReading, spec: BenchSpec) -> None:
     """Whose answers do not name their request is the only device on its bus."""
     for name, bus in spec.bus.items():
         units = {
@@ -106,7 +106,7 @@ def _check_deviations(reading: Reading, spec: BenchSpec) -> None:
 
 
 def _check_robot(
-    reading: Reading, spec: BenchSpec, robot: RobotWiring, read_robot: RobotReader
+    reading: FileReading, spec: BenchSpec, robot: RobotWiring, read_robot: RobotReader
 ) -> None:
     """Each line of the robot is a winch of the bench, within the winch's limits."""
     if not spec.stop_together:
@@ -138,7 +138,7 @@ def _check_robot(
 
 
 def sim_bench(
-    reading: Reading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
+    reading: FileReading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
 ) -> SimBench | None:
     """Read a simulated bench: a bench, its true values, hidden effects, noise and faults."""
     tree = dict(tree)
@@ -167,7 +167,7 @@ def sim_bench(
     return SimBench(wired.name, wired, known, noise, faults, wired.description, platform)
 
 
-def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTruth | None:
+def _truth(reading: FileReading, name: str, raw: object, hidden: object) -> WinchTruth | None:
     at: Key = ("winch", name, "truth")
     if not isinstance(raw, dict):
         reading.fault(at, f"expected a table, not {raw!r}")
@@ -180,7 +180,7 @@ def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTru
     return reading.table(WinchTruth, {**own, "overrides": overrides, "hidden": pieces}, at)
 
 
-def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
+def _check_override(reading: FileReading, at: Key, key: str, value: object) -> None:
     words: Key = tuple(int(word) if word.isdecimal() else word for word in key.split("."))
     marker = marker_at(WinchProfile, words)
     place: Key = (*at, key) if (*at, key) in reading.source.lines else (*at, *key.split("."))
@@ -195,7 +195,7 @@ def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:
 
 
 def _numbered(
-    reading: Reading, kind: type[HiddenSpec] | type[FaultSpec], raw: object, at: Key
+    reading: FileReading, kind: type[HiddenSpec] | type[FaultSpec], raw: object, at: Key
 ) -> Iterator[Any]:
     """Read ``[[hidden]]`` or ``[[fault]]`` tables; their further keys are numbers."""
     if not isinstance(raw, list) or not all(isinstance(item, dict) for item in raw):
@@ -210,7 +210,9 @@ def _numbered(
             yield piece
 
 
-def _check_references(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> None:
+def _check_references(
+    reading: FileReading, tree: dict[str, Any], read_device: DeviceReader
+) -> None:
     """Profiles and devices exist, buses exist and fit, no two devices share an address."""
     winches, buses = tree.get("winch"), tree.get("bus")
     taken: dict[tuple[str, str, int], str] = {}
@@ -228,7 +230,7 @@ def _check_references(reading: Reading, tree: dict[str, Any], read_device: Devic
 
 
 def _check_address(
-    reading: Reading, raw: dict[str, Any], at: Key, taken: dict[tuple[str, str, int], str]
+    reading: FileReading, raw: dict[str, Any], at: Key, taken: dict[tuple[str, str, int], str]
 ) -> None:
     for key in ("node", "unit"):
         bus, address = raw.get("bus"), raw.get(key)
@@ -240,7 +242,7 @@ def _check_address(
 
 
 def _check_device(
-    reading: Reading,
+    reading: FileReading,
     raw: dict[str, Any],
     buses: dict[str, Any],
     at: Key,
@@ -280,7 +282,7 @@ def _check_device(
         reading.fault((*at, "bus"), message)
 
 
-def _check_measured(reading: Reading, device: DeviceSpec, at: Key) -> None:
+def _check_measured(reading: FileReading, device: DeviceSpec, at: Key) -> None:
     """An instrument measures what its role needs; bare counts of a cell have a calibration."""
     wanted, found = _MEASURED.get(str(at[-1])), device.dimension
     if wanted is None or found in (None, wanted) or (wanted, found) == ("force", "ratio"):

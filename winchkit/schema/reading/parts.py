@@ -12,7 +12,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.profiles.axis import AxisProfile, LinearAxisProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.schema.reading.lines import Key
-from winchkit.schema.reading.source import Source
+from winchkit.schema.reading.source import TomlSource
 from winchkit.schema.reading.tables import read_table
 
 T = TypeVar("T")
@@ -27,10 +27,10 @@ _PARTS_OF_A_ROTARY_AXIS: Mapping[tuple[str, ...], str] = {
 
 
 @dataclass
-class Reading:
+class FileReading:
     """One file being read: its source and the faults found so far."""
 
-    source: Source
+    source: TomlSource
     faults: list[Fault] = field(default_factory=list)
 
     @property

@@ -38,7 +38,7 @@ _LOGGER = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Source:
+class TomlSource:
     """A TOML file as read: its values, and the line of each."""
 
     path: str
@@ -58,7 +58,7 @@ def spelled(key: Key) -> str:
     return words.removeprefix(".")
 
 
-def open_source(path: str | Path) -> Source:
+def open_source(path: str | Path) -> TomlSource:
     """Read a declaration of any kind; raises FileError for any other file."""
     text = _text(path_of(path))
     if not text.strip():
@@ -102,10 +102,10 @@ def _syntax_fault(message: str, path: str, text: str) -> Fault:
     return Fault(f"TOML syntax: {reason} at column {found[2]}", path, int(found[1]))
 
 
-def _source(path: str, tree: dict[str, Any], lines: dict[Key, int]) -> Source:
+def _source(path: str, tree: dict[str, Any], lines: dict[Key, int]) -> TomlSource:
     kind = tree.pop("kind", None)
     schema = tree.pop("schema", None)
-    source = Source(path, str(kind), tree, lines)
+    source = TomlSource(path, str(kind), tree, lines)
     faults: list[Fault] = []
     if schema is None:
         faults.append(source.fault(("schema",), f"missing; write schema = {SCHEMA} first"))

@@ -14,13 +14,13 @@ from pydantic_core import ErrorDetails
 from winchkit.errors import Fault, suggest
 from winchkit.schema.quantity import Marker
 from winchkit.schema.reading.lines import Key
-from winchkit.schema.reading.source import Source
+from winchkit.schema.reading.source import TomlSource
 from winchkit.schema.table import BrokenRules
 
 T = TypeVar("T")
 
 
-def read_table(source: Source, kind: type[T], raw: object, at: Key = ()) -> T | list[Fault]:
+def read_table(source: TomlSource, kind: type[T], raw: object, at: Key = ()) -> T | list[Fault]:
     """Read ``raw``, the table at the key ``at`` of the source, or list all its faults."""
     try:
         table: T = _adapter(kind).validate_python(raw)  # type: ignore[arg-type] # classes hash

@@ -9,7 +9,7 @@ from itertools import count
 from typing import Any
 
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.buses import Wire
+from winchkit.sim.live.buses import BusWire
 
 _FRAME_BITS = 47
 """Bits of a data frame of an 11-bit identifier without its data, interframe space included."""
@@ -30,7 +30,7 @@ class SimulatedCanBus:
     def __init__(
         self,
         clock: SimulatedClock,
-        wire: Wire,
+        wire: BusWire,
         bitrate: int,
         deliver: Callable[[int, bytes], None],
     ) -> None:

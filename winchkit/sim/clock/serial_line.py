@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.instruments.stream import StreamInstrument
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument
 
 _TICK = 2e-3
 """s, as of the line in real time."""
@@ -20,7 +20,7 @@ class SimulatedSerialLine:
 
     def __init__(
         self,
-        instruments: Sequence[StreamInstrument],
+        instruments: Sequence[SimulatedStreamInstrument],
         up_to_date: Callable[[], AbstractContextManager[None]],
         clock: SimulatedClock,
     ) -> None:

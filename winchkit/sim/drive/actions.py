@@ -7,9 +7,9 @@ from collections.abc import Container
 from winchkit.schema.devices.servo import QuirkSpec
 from winchkit.sim.drive.homing import HOMING_METHODS
 from winchkit.sim.drive.modes import Mode
-from winchkit.sim.drive.motion import Motion
+from winchkit.sim.drive.motion import DriveMotion
 from winchkit.sim.drive.object_dictionary import Abort, Guard, ObjectDictionary
-from winchkit.sim.drive.power import HALT, PowerStage, State
+from winchkit.sim.drive.power import HALT, PowerStage, PowerState
 from winchkit.sim.drive.shaft import Shaft
 from winchkit.sim.drive.units import SCALES
 
@@ -43,7 +43,7 @@ def _only(allowed: Container[int]) -> Guard:
 
 _TARGETS = (0x607A, 0x60FF, 0x60B0, 0x60B1, 0x60C1)
 _SI_UNITS = (0x60A8, 0x60A9)
-_POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION)
+_POWERED = (PowerState.OPERATION_ENABLED, PowerState.QUICK_STOP_ACTIVE, PowerState.FAULT_REACTION)
 
 
 class Actions:
@@ -54,7 +54,7 @@ class Actions:
         objects: ObjectDictionary,
         shaft: Shaft,
         power: PowerStage,
-        motion: Motion,
+        motion: DriveMotion,
         *,
         quirks: QuirkSpec,
     ) -> None:
@@ -72,7 +72,7 @@ class Actions:
     def _control(self, _sub: int, word: int) -> None:
         self._motion.halted = bool(word & HALT)
         self._power.control(word)
-        enabled = self._power.state is State.OPERATION_ENABLED
+        enabled = self._power.state is PowerState.OPERATION_ENABLED
         self._motion.control(word, self._shaft.motor_angle, enabled=enabled)
 
     def _choose_mode(self, _sub: int, value: int) -> None:

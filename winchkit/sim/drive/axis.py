@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from math import ceil, inf
 from typing import NamedTuple
 
-from winchkit.sim.drive.motion import Motion
+from winchkit.sim.drive.motion import DriveMotion
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.power import PowerStage
 from winchkit.sim.drive.shaft import Shaft
@@ -30,7 +30,7 @@ class _Sample(NamedTuple):
     following_error: float = 0.0
 
 
-class Axis:
+class DriveAxis:
     """Motion and feedback, starting at the time ``now``, in steps of at most ``longest_step`` s.
 
     ``following_failed`` is called while the following error (60F4h) has been beyond its window
@@ -42,7 +42,7 @@ class Axis:
         objects: ObjectDictionary,
         shaft: Shaft,
         power: PowerStage,
-        motion: Motion,
+        motion: DriveMotion,
         status: StatusBits,
         *,
         now: float,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from math import inf
 
-from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
+from winchkit.sim.drive.demand import DriveDemand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
@@ -77,7 +77,7 @@ class CyclicPosition(SetPoints):
     position = True
     cyclic = True
 
-    def __init__(self, settings: Settings, demand: Demand, smoothing: float = 0.0) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand, smoothing: float = 0.0) -> None:
         super().__init__(settings, demand)
         self._interpolation = _Interpolation(settings)
         self._smooth = MovingAverage(smoothing)
@@ -124,7 +124,7 @@ class InterpolatedPosition(CyclicPosition):
 
     cyclic = False
 
-    def __init__(self, settings: Settings, demand: Demand, smoothing: float = 0.0) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand, smoothing: float = 0.0) -> None:
         super().__init__(settings, demand, smoothing)
         self._active = False
 
@@ -161,7 +161,7 @@ class CyclicVelocity(SetPoints):
 
     cyclic = True
 
-    def __init__(self, settings: Settings, demand: Demand, smoothing: float) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand, smoothing: float) -> None:
         super().__init__(settings, demand)
         self._interpolation = _Interpolation(settings)
         self._smooth = MovingAverage(smoothing)

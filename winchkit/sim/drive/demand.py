@@ -16,7 +16,7 @@ def approach(value: float, goal: float, step: float) -> float:
 
 
 @dataclass
-class Demand:
+class DriveDemand:
     """Present demand at the motor shaft."""
 
     angle: float = 0.0
@@ -59,7 +59,7 @@ class SetPoints:
     torque = False
     cyclic = False
 
-    def __init__(self, settings: Settings, demand: Demand) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand) -> None:
         self.settings, self.demand = settings, demand
 
     def reset(self) -> None:

@@ -8,15 +8,15 @@ from functools import partial
 
 from winchkit.schema.devices.servo import QuirkSpec, ServoSpec
 from winchkit.sim.drive.actions import Actions
-from winchkit.sim.drive.axis import Axis
+from winchkit.sim.drive.axis import DriveAxis
 from winchkit.sim.drive.faults import FAULTS, FaultKind, known
 from winchkit.sim.drive.homing import Switches
 from winchkit.sim.drive.modes import Mode, check_objects, modes_of, supported
-from winchkit.sim.drive.motion import Motion
-from winchkit.sim.drive.nmt import Heartbeats, NmtState, emergency_frame
+from winchkit.sim.drive.motion import DriveMotion
+from winchkit.sim.drive.nmt import Heartbeats, NodeState, emergency_frame
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.pdo import Pdos
-from winchkit.sim.drive.power import PowerStage, State
+from winchkit.sim.drive.power import PowerStage, PowerState
 from winchkit.sim.drive.sdo import SdoServer
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.drive.shaft import HoldingBrake, Shaft
@@ -30,7 +30,7 @@ _STORM_CODE = 0x8120
 """CAN error passive."""
 
 
-class Line:
+class FrameSender:
     """Sends frames at once, late, or not at all.
 
     ``emergency`` sends an EMCY of a code; a storm calls it every millisecond.
@@ -79,9 +79,9 @@ _HEARTBEAT_LOST = FaultKind(0x8130)
 _PDO_TOO_SHORT = 0x8210
 """EMCY error code of CiA 301: PDO not processed due to length error."""
 _NMT_COMMANDS = {
-    0x01: NmtState.OPERATIONAL,
-    0x02: NmtState.STOPPED,
-    0x80: NmtState.PRE_OPERATIONAL,
+    0x01: NodeState.OPERATIONAL,
+    0x02: NodeState.STOPPED,
+    0x80: NodeState.PRE_OPERATIONAL,
 }
 _COMMUNICATION = range(0x1000, 0x2000)
 
@@ -115,27 +115,27 @@ class SimDrive:
         check_objects(objects, modes_of(servo.modes), node)
         self.node = node
         self.objects = objects
-        self.nmt = NmtState.BOOTING
+        self.nmt = NodeState.BOOTING
         self._servo, self._shaft, self._quirks = servo, shaft, servo.quirks
         self._tolerance = tolerance
         self._booted_at = now
         self._error = 0
         self._sdo_refuses = self._inhibited = False
-        self._line = Line(send, self._emergency)
+        self._line = FrameSender(send, self._emergency)
         self._sdo = SdoServer(objects)
         lost, back = self._host_lost, self._host_back
         self._heartbeats = Heartbeats(objects, self._send_heartbeat, lost, back)
         self._heartbeats.needs_both = self._quirks.needs_both_heartbeats
         self._power = PowerStage(objects, self._state_changed)
         self._power.may_enable = self._may_enable
-        self._motion = Motion(
+        self._motion = DriveMotion(
             Settings(objects, servo),
             {Mode.NONE, *modes_of(servo.modes)},
             _brake_of(self._quirks, fitted=brake),
             smoothing=smoothing,
         )
         self._status = StatusBits(objects, self._motion, toggling=self._quirks.toggles_bit_10)
-        self._axis = Axis(
+        self._axis = DriveAxis(
             objects,
             shaft,
             self._power,
@@ -154,7 +154,7 @@ class SimDrive:
     # State.
 
     @property
-    def state(self) -> State:
+    def state(self) -> PowerState:
         """State of the power state machine of CiA 402."""
         return self._power.state
 
@@ -187,7 +187,7 @@ class SimDrive:
         self._sdo.reset()
         self._pdos.rebuild()
         self._heartbeats.producing = True
-        self.nmt = NmtState.BOOTING
+        self.nmt = NodeState.BOOTING
 
     def listens(self, identifier: int) -> bool:
         """Whether it is the identifier of a valid RPDO."""
@@ -195,7 +195,7 @@ class SimDrive:
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the bus."""
-        if self._line.cut or self.nmt is NmtState.BOOTING:
+        if self._line.cut or self.nmt is NodeState.BOOTING:
             return
         if identifier == 0x000:
             self._manage(data, now)
@@ -203,7 +203,7 @@ class SimDrive:
             self._serve_sdo(data, now)
         elif 0x700 < identifier <= 0x77F:
             self._heartbeats.heard(identifier - 0x700, now)
-        elif self.nmt is not NmtState.OPERATIONAL:
+        elif self.nmt is not NodeState.OPERATIONAL:
             return
         elif self._pdos.listens(identifier):
             if not self._pdos.waits(identifier):
@@ -218,7 +218,7 @@ class SimDrive:
     def tick(self, now: float, all_heard: bool = True) -> None:
         """Advance time to ``now``; missing heartbeats are judged where ``all_heard``."""
         self._axis.advance(now, self._tolerance)
-        if self.nmt is NmtState.BOOTING:
+        if self.nmt is NodeState.BOOTING:
             if now >= self._booted_at:
                 self._boot_up(now)
             return
@@ -226,7 +226,7 @@ class SimDrive:
         if all_heard:
             self._heartbeats.watch(now)
         self._line.tick(now)
-        if self.nmt is NmtState.OPERATIONAL:
+        if self.nmt is NodeState.OPERATIONAL:
             self._pdos.poll(now)
 
     def inject(self, kind: str) -> None:
@@ -268,9 +268,9 @@ class SimDrive:
 
     def _boot_up(self, now: float) -> None:
         self._line.send(0x700 + self.node, b"\0")
-        self.nmt = NmtState.PRE_OPERATIONAL
+        self.nmt = NodeState.PRE_OPERATIONAL
         self._heartbeats.start(now)
-        if self.state is State.NOT_READY:
+        if self.state is PowerState.NOT_READY:
             self._power.ready()
 
     def _manage(self, data: bytes, now: float) -> None:
@@ -285,13 +285,13 @@ class SimDrive:
         elif command in _NMT_COMMANDS:
             self._enter_nmt(_NMT_COMMANDS[command])
 
-    def _enter_nmt(self, state: NmtState) -> None:
+    def _enter_nmt(self, state: NodeState) -> None:
         before, self.nmt = self.nmt, state
         if state is before:
             return
-        if state is NmtState.STOPPED:
+        if state is NodeState.STOPPED:
             self._abort_connection()
-        elif before is NmtState.OPERATIONAL and self._quirks.stops_outside_operational:
+        elif before is NodeState.OPERATIONAL and self._quirks.stops_outside_operational:
             self._power.shut_down()
 
     def _reset_communication(self, now: float) -> None:
@@ -299,10 +299,10 @@ class SimDrive:
         self.objects.reset(_COMMUNICATION)
         self._sdo.reset()
         self._pdos.rebuild()
-        self.nmt, self._booted_at = NmtState.BOOTING, now
+        self.nmt, self._booted_at = NodeState.BOOTING, now
 
     def _serve_sdo(self, data: bytes, now: float) -> None:
-        if self.nmt is NmtState.STOPPED:
+        if self.nmt is NodeState.STOPPED:
             return
         self.advance(now)
         self._axis.sample()
@@ -316,9 +316,9 @@ class SimDrive:
         self._abort_connection()
         behaviour = self.objects.number(0x1029, 1, 0)
         if behaviour == 2:
-            self._enter_nmt(NmtState.STOPPED)
-        elif behaviour == 0 and self.nmt is NmtState.OPERATIONAL:
-            self._enter_nmt(NmtState.PRE_OPERATIONAL)
+            self._enter_nmt(NodeState.STOPPED)
+        elif behaviour == 0 and self.nmt is NodeState.OPERATIONAL:
+            self._enter_nmt(NodeState.PRE_OPERATIONAL)
 
     def _host_back(self) -> None:
         if not self._error:
@@ -331,7 +331,7 @@ class SimDrive:
             self._power.abort_connection()
 
     def _emergency(self, code: int) -> None:
-        if self.nmt is not NmtState.BOOTING:
+        if self.nmt is not NodeState.BOOTING:
             self._line.send(0x80 + self.node, emergency_frame(self.objects, code))
 
     def _send_heartbeat(self) -> None:
@@ -344,14 +344,14 @@ class SimDrive:
         return chosen and not self._inhibited
 
     def _fault(self, kind: FaultKind) -> None:
-        if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
+        if self.state in (PowerState.FAULT, PowerState.FAULT_REACTION, PowerState.NOT_READY):
             return
         self._error = kind.code
         self._emergency(kind.code)
         self._power.fault(cut=kind.cuts)
 
-    def _state_changed(self, state: State) -> None:
-        if state is State.SWITCH_ON_DISABLED and self._error:
+    def _state_changed(self, state: PowerState) -> None:
+        if state is PowerState.SWITCH_ON_DISABLED and self._error:
             self._error = 0
             self._emergency(0)
 

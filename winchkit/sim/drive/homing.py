@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import floor, inf, isinf, pi
 
-from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
+from winchkit.sim.drive.demand import DriveDemand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
@@ -99,11 +99,11 @@ class _Phase(Enum):
     FAILED = _ERROR
 
 
-class Homing(SetPoints):
+class HomingMode(SetPoints):
     """HM: a set bit 4 of the control word starts a search, a cleared one ends it."""
 
     def __init__(
-        self, settings: Settings, demand: Demand, switches: Callable[[], Switches]
+        self, settings: Settings, demand: DriveDemand, switches: Callable[[], Switches]
     ) -> None:
         super().__init__(settings, demand)
         self._switches = switches

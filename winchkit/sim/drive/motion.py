@@ -10,8 +10,8 @@ from winchkit.sim.drive.cyclic_modes import (
     CyclicVelocity,
     InterpolatedPosition,
 )
-from winchkit.sim.drive.demand import Demand, SetPoints, approach
-from winchkit.sim.drive.homing import Homing, Switches
+from winchkit.sim.drive.demand import DriveDemand, SetPoints, approach
+from winchkit.sim.drive.homing import HomingMode, Switches
 from winchkit.sim.drive.modes import Mode
 from winchkit.sim.drive.power import RAMPS, Order
 from winchkit.sim.drive.profile_modes import ProfilePosition, ProfileTorque, ProfileVelocity
@@ -26,7 +26,7 @@ _TIMEOUT = 0.5
 _HOLD, _BRAKED, _FREE = DriveCommand(), DriveCommand.off(brake=True), DriveCommand.off(brake=False)
 
 
-class Motion:
+class DriveMotion:
     """Computes a :class:`DriveCommand` from an order, the mode and the targets.
 
     ``angle`` and ``speed`` of the methods are those of the motor, rad and rad/s.
@@ -41,7 +41,7 @@ class Motion:
         smoothing: float = 0.0,
     ) -> None:
         self.settings = settings
-        self.demand = Demand()
+        self.demand = DriveDemand()
         self.switches = Switches()
         self.halted = False
         self.stopping = False
@@ -132,14 +132,14 @@ class Motion:
 
 
 def _all(
-    settings: Settings, demand: Demand, smoothing: float, switches: Callable[[], Switches]
+    settings: Settings, demand: DriveDemand, smoothing: float, switches: Callable[[], Switches]
 ) -> dict[Mode, SetPoints]:
     return {
         Mode.NONE: SetPoints(settings, demand),
         Mode.PP: ProfilePosition(settings, demand),
         Mode.PV: ProfileVelocity(settings, demand),
         Mode.PT: ProfileTorque(settings, demand),
-        Mode.HM: Homing(settings, demand, switches),
+        Mode.HM: HomingMode(settings, demand, switches),
         Mode.IP: InterpolatedPosition(settings, demand, smoothing),
         Mode.CSP: CyclicPosition(settings, demand, smoothing),
         Mode.CSV: CyclicVelocity(settings, demand, smoothing),

@@ -19,7 +19,7 @@ _MS = 1e-3
 """s: unit of the two times."""
 
 
-class NmtState(IntEnum):
+class NodeState(IntEnum):
     """NMT state as in a heartbeat."""
 
     BOOTING = 0

@@ -13,7 +13,7 @@ HALT = 0x0100
 """Bits 7 and 8 of the control word 6040h (CiA 402)."""
 
 
-class State(IntEnum):
+class PowerState(IntEnum):
     """The value is the status word's bits 0 to 3, 5 and 6."""
 
     NOT_READY = 0x00
@@ -26,7 +26,7 @@ class State(IntEnum):
     FAULT = 0x08
 
 
-class Command(IntEnum):
+class PowerCommand(IntEnum):
     """Commands in bits 0 to 3 and 7 of a control word."""
 
     DISABLE_VOLTAGE = 0
@@ -36,42 +36,58 @@ class Command(IntEnum):
     ENABLE = 4
 
 
-class Transition(NamedTuple):
+class PowerTransition(NamedTuple):
     """A row of the table of transitions in CiA 402."""
 
     number: int
-    target: State
+    target: PowerState
 
 
-TRANSITIONS: dict[tuple[State, Command], Transition] = {
-    (State.SWITCH_ON_DISABLED, Command.SHUTDOWN): Transition(2, State.READY),
-    (State.READY, Command.SWITCH_ON): Transition(3, State.SWITCHED_ON),
-    (State.READY, Command.ENABLE): Transition(3, State.SWITCHED_ON),
-    (State.SWITCHED_ON, Command.ENABLE): Transition(4, State.OPERATION_ENABLED),
-    (State.OPERATION_ENABLED, Command.SWITCH_ON): Transition(5, State.SWITCHED_ON),
-    (State.SWITCHED_ON, Command.SHUTDOWN): Transition(6, State.READY),
-    (State.READY, Command.QUICK_STOP): Transition(7, State.SWITCH_ON_DISABLED),
-    (State.READY, Command.DISABLE_VOLTAGE): Transition(7, State.SWITCH_ON_DISABLED),
-    (State.OPERATION_ENABLED, Command.SHUTDOWN): Transition(8, State.READY),
-    (State.OPERATION_ENABLED, Command.DISABLE_VOLTAGE): Transition(9, State.SWITCH_ON_DISABLED),
-    (State.SWITCHED_ON, Command.QUICK_STOP): Transition(10, State.SWITCH_ON_DISABLED),
-    (State.SWITCHED_ON, Command.DISABLE_VOLTAGE): Transition(10, State.SWITCH_ON_DISABLED),
-    (State.OPERATION_ENABLED, Command.QUICK_STOP): Transition(11, State.QUICK_STOP_ACTIVE),
-    (State.QUICK_STOP_ACTIVE, Command.DISABLE_VOLTAGE): Transition(12, State.SWITCH_ON_DISABLED),
-    (State.QUICK_STOP_ACTIVE, Command.ENABLE): Transition(16, State.OPERATION_ENABLED),
+TRANSITIONS: dict[tuple[PowerState, PowerCommand], PowerTransition] = {
+    (PowerState.SWITCH_ON_DISABLED, PowerCommand.SHUTDOWN): PowerTransition(2, PowerState.READY),
+    (PowerState.READY, PowerCommand.SWITCH_ON): PowerTransition(3, PowerState.SWITCHED_ON),
+    (PowerState.READY, PowerCommand.ENABLE): PowerTransition(3, PowerState.SWITCHED_ON),
+    (PowerState.SWITCHED_ON, PowerCommand.ENABLE): PowerTransition(4, PowerState.OPERATION_ENABLED),
+    (PowerState.OPERATION_ENABLED, PowerCommand.SWITCH_ON): PowerTransition(
+        5, PowerState.SWITCHED_ON
+    ),
+    (PowerState.SWITCHED_ON, PowerCommand.SHUTDOWN): PowerTransition(6, PowerState.READY),
+    (PowerState.READY, PowerCommand.QUICK_STOP): PowerTransition(7, PowerState.SWITCH_ON_DISABLED),
+    (PowerState.READY, PowerCommand.DISABLE_VOLTAGE): PowerTransition(
+        7, PowerState.SWITCH_ON_DISABLED
+    ),
+    (PowerState.OPERATION_ENABLED, PowerCommand.SHUTDOWN): PowerTransition(8, PowerState.READY),
+    (PowerState.OPERATION_ENABLED, PowerCommand.DISABLE_VOLTAGE): PowerTransition(
+        9, PowerState.SWITCH_ON_DISABLED
+    ),
+    (PowerState.SWITCHED_ON, PowerCommand.QUICK_STOP): PowerTransition(
+        10, PowerState.SWITCH_ON_DISABLED
+    ),
+    (PowerState.SWITCHED_ON, PowerCommand.DISABLE_VOLTAGE): PowerTransition(
+        10, PowerState.SWITCH_ON_DISABLED
+    ),
+    (PowerState.OPERATION_ENABLED, PowerCommand.QUICK_STOP): PowerTransition(
+        11, PowerState.QUICK_STOP_ACTIVE
+    ),
+    (PowerState.QUICK_STOP_ACTIVE, PowerCommand.DISABLE_VOLTAGE): PowerTransition(
+        12, PowerState.SWITCH_ON_DISABLED
+    ),
+    (PowerState.QUICK_STOP_ACTIVE, PowerCommand.ENABLE): PowerTransition(
+        16, PowerState.OPERATION_ENABLED
+    ),
 }
 """Transitions by command. 0, 1 (boot), 13, 14 (fault) and 15 (reset) need none."""
 
 
-def command_of(word: int) -> Command:
+def command_of(word: int) -> PowerCommand:
     """Decode a control word without the bits that a command ignores."""
     if not word & 0b0010:
-        return Command.DISABLE_VOLTAGE
+        return PowerCommand.DISABLE_VOLTAGE
     if not word & 0b0100:
-        return Command.QUICK_STOP
+        return PowerCommand.QUICK_STOP
     if not word & 0b0001:
-        return Command.SHUTDOWN
-    return Command.ENABLE if word & 0b1000 else Command.SWITCH_ON
+        return PowerCommand.SHUTDOWN
+    return PowerCommand.ENABLE if word & 0b1000 else PowerCommand.SWITCH_ON
 
 
 _ABORT_FAULT, _ABORT_DISABLE, _ABORT_QUICK_STOP = 1, 2, 3
@@ -104,13 +120,13 @@ class PowerStage:
     takes effect when it is written: an earlier control word does not move a drive that has stopped.
     """
 
-    def __init__(self, objects: ObjectDictionary, changed: Callable[[State], None]) -> None:
+    def __init__(self, objects: ObjectDictionary, changed: Callable[[PowerState], None]) -> None:
         self._objects = objects
         self._changed = changed
         self.may_enable: Callable[[], bool] = lambda: True
-        self.state = State.NOT_READY
+        self.state = PowerState.NOT_READY
         self.order = Order.OFF
-        self._after: State | None = None
+        self._after: PowerState | None = None
         self._last_word = 0
         self.cause_persists = False
         """Whether the cause of a fault persists, so that it cannot be reset."""
@@ -118,39 +134,39 @@ class PowerStage:
     def reset(self) -> None:
         """Power on: not ready to switch on."""
         self._last_word = 0
-        self._enter(State.NOT_READY)
+        self._enter(PowerState.NOT_READY)
 
     def ready(self) -> None:
         """Transition 1: the self-test is over."""
-        self._enter(State.SWITCH_ON_DISABLED)
+        self._enter(PowerState.SWITCH_ON_DISABLED)
 
     def control(self, word: int) -> None:
         """Evaluate a control word that was just written."""
         rising = word & ~self._last_word & FAULT_RESET
         self._last_word = word
-        if self.state is State.FAULT:
+        if self.state is PowerState.FAULT:
             if rising and not self.cause_persists:
-                self._enter(State.SWITCH_ON_DISABLED)
+                self._enter(PowerState.SWITCH_ON_DISABLED)
             return
         command = command_of(word)
-        if command is Command.ENABLE and self._ramp_can_be_cancelled():
+        if command is PowerCommand.ENABLE and self._ramp_can_be_cancelled():
             self._after, self.order = None, Order.FOLLOW
         while self._obey(command):
             pass
 
     def quick_stop(self) -> None:
         """Quick stop, as by a control word."""
-        while self._obey(Command.QUICK_STOP):
+        while self._obey(PowerCommand.QUICK_STOP):
             pass
 
     def shut_down(self) -> None:
         """Shut down to Ready To Switch On, as by a control word."""
-        while self._obey(Command.SHUTDOWN):
+        while self._obey(PowerCommand.SHUTDOWN):
             pass
 
     def disable_voltage(self) -> None:
         """Disable the voltage, as by a control word."""
-        while self._obey(Command.DISABLE_VOLTAGE):
+        while self._obey(PowerCommand.DISABLE_VOLTAGE):
             pass
 
     def abort_connection(self) -> None:
@@ -168,14 +184,14 @@ class PowerStage:
 
     def fault(self, *, cut: bool = False) -> None:
         """Transition 13, with the reaction of 605Eh or with a ``cut`` of the power, then 14."""
-        if self.state in (State.FAULT, State.FAULT_REACTION, State.NOT_READY):
+        if self.state in (PowerState.FAULT, PowerState.FAULT_REACTION, PowerState.NOT_READY):
             return
         ramp = RAMPS.get(self._option(0x605E))
         if cut or ramp is None or self.order in (Order.OFF, Order.CUT):
-            self._enter(State.FAULT)
+            self._enter(PowerState.FAULT)
             self.order = Order.CUT if cut else Order.OFF
         else:
-            self._ramp(ramp, State.FAULT_REACTION, State.FAULT)
+            self._ramp(ramp, PowerState.FAULT_REACTION, PowerState.FAULT)
 
     def standstill(self) -> None:
         """End a ramp."""
@@ -184,9 +200,9 @@ class PowerStage:
             self._enter(after)
 
     def _ramp_can_be_cancelled(self) -> bool:
-        return self.state is State.OPERATION_ENABLED and self._after is not None
+        return self.state is PowerState.OPERATION_ENABLED and self._after is not None
 
-    def _obey(self, command: Command) -> bool:
+    def _obey(self, command: PowerCommand) -> bool:
         row = TRANSITIONS.get((self.state, command))
         if row is None:
             return False
@@ -217,23 +233,23 @@ class PowerStage:
         if option < 0:
             return False
         if option == 0:
-            self._enter(State.SWITCH_ON_DISABLED)
+            self._enter(PowerState.SWITCH_ON_DISABLED)
         elif option < _STAYS:
-            self._ramp(RAMPS[option], State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED)
+            self._ramp(RAMPS[option], PowerState.QUICK_STOP_ACTIVE, PowerState.SWITCH_ON_DISABLED)
         else:
-            self._ramp(RAMPS[option - 4], State.QUICK_STOP_ACTIVE, None)
+            self._ramp(RAMPS[option - 4], PowerState.QUICK_STOP_ACTIVE, None)
         return True
 
-    def _ramp(self, order: Order, state: State, after: State | None) -> None:
+    def _ramp(self, order: Order, state: PowerState, after: PowerState | None) -> None:
         self.order, self._after = order, after
         self._set(state)
 
-    def _enter(self, state: State) -> None:
-        self.order = Order.FOLLOW if state is State.OPERATION_ENABLED else Order.OFF
+    def _enter(self, state: PowerState) -> None:
+        self.order = Order.FOLLOW if state is PowerState.OPERATION_ENABLED else Order.OFF
         self._after = None
         self._set(state)
 
-    def _set(self, state: State) -> None:
+    def _set(self, state: PowerState) -> None:
         if state is not self.state:
             self.state = state
             self._changed(state)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import copysign, sqrt
 
-from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
+from winchkit.sim.drive.demand import DriveDemand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
 
 @dataclass(frozen=True)
-class Move:
+class AcceptedSetpoint:
     """A set-point with the values at its acceptance, SI."""
 
     target: float
@@ -25,8 +25,8 @@ class Moves:
     """The moves of the mode PP."""
 
     def __init__(self) -> None:
-        self.current: Move | None = None
-        self.next: Move | None = None
+        self.current: AcceptedSetpoint | None = None
+        self.next: AcceptedSetpoint | None = None
         """The next set-point."""
 
     def reset(self) -> None:
@@ -39,7 +39,7 @@ class Moves:
         last = self.next or self.current
         return None if last is None else last.target
 
-    def accept(self, move: Move, *, at_once: bool) -> bool:
+    def accept(self, move: AcceptedSetpoint, *, at_once: bool) -> bool:
         """Accept a set-point; False where a next one is waiting already."""
         if at_once or self.current is None:
             self.current, self.next = move, None
@@ -50,7 +50,7 @@ class Moves:
         return True
 
     def step(
-        self, move: Move, angle: float, speed: float, fastest: float, dt: float
+        self, move: AcceptedSetpoint, angle: float, speed: float, fastest: float, dt: float
     ) -> tuple[float, float]:
         """Angle and speed after ``dt`` s of the current move, no faster than ``fastest``."""
         left = move.target - angle
@@ -76,7 +76,7 @@ class ProfilePosition(SetPoints):
 
     position = True
 
-    def __init__(self, settings: Settings, demand: Demand) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand) -> None:
         super().__init__(settings, demand)
         self._moves = Moves()
         self._taken = False
@@ -93,14 +93,14 @@ class ProfilePosition(SetPoints):
             move = self._move(angle, relative=bool(word & _RELATIVE))
             self._taken = self._moves.accept(move, at_once=bool(word & _AT_ONCE))
 
-    def _move(self, angle: float, *, relative: bool) -> Move:
+    def _move(self, angle: float, *, relative: bool) -> AcceptedSetpoint:
         settings = self.settings
         wanted = settings.angle(settings.number(0x607A))
         if relative:
             last = self._moves.last
             wanted += (angle if last is None else last) - settings.zero
         low, high = settings.limits.angle
-        return Move(
+        return AcceptedSetpoint(
             min(max(wanted, low), high),
             settings.number(0x6081) * settings.units.speed,
             settings.ramp(0x6083),
@@ -152,7 +152,7 @@ class ProfileTorque(SetPoints):
 
     torque = True
 
-    def __init__(self, settings: Settings, demand: Demand) -> None:
+    def __init__(self, settings: Settings, demand: DriveDemand) -> None:
         super().__init__(settings, demand)
         self._arrived = False
 

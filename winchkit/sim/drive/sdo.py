@@ -13,7 +13,7 @@ _SEGMENT = 7
 
 
 @dataclass
-class _Transfer:
+class _SegmentedTransfer:
     """A segmented transfer in progress."""
 
     key: Key
@@ -30,7 +30,7 @@ class SdoServer:
 
     def __init__(self, objects: ObjectDictionary) -> None:
         self._objects = objects
-        self._transfer: _Transfer | None = None
+        self._transfer: _SegmentedTransfer | None = None
 
     def reset(self) -> None:
         """Discard a transfer in progress."""
@@ -70,7 +70,7 @@ class SdoServer:
         if 1 <= len(data) <= 4:
             head = 0x43 | (4 - len(data)) << 2
             return struct.pack("<BHB", head, *key) + data.ljust(4, b"\0")
-        self._transfer = _Transfer(key, upload=True, data=data)
+        self._transfer = _SegmentedTransfer(key, upload=True, data=data)
         return struct.pack("<BHBI", 0x41, *key, len(data))
 
     def _upload_segment(self, request: bytes) -> bytes:
@@ -95,7 +95,7 @@ class SdoServer:
         sized = bool(head & 1)
         if not head & 2:
             size = int.from_bytes(request[4:], "little") if sized else None
-            self._transfer = _Transfer(key, upload=False, data=b"", size=size)
+            self._transfer = _SegmentedTransfer(key, upload=False, data=b"", size=size)
             return struct.pack("<BHBI", 0x60, *key, 0)
         entry = self._objects.entry(key)
         declared = 4 if isinstance(entry, Abort) else entry.size or 4

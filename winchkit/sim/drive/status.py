@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from winchkit.sim.drive.modes import Mode
-from winchkit.sim.drive.motion import Motion
+from winchkit.sim.drive.motion import DriveMotion
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
-from winchkit.sim.drive.power import State
+from winchkit.sim.drive.power import PowerState
 
 _VOLTAGE, _REMOTE, _REACHED, _LIMIT = 1 << 4, 1 << 9, 1 << 10, 1 << 11
 
@@ -16,7 +16,7 @@ class StatusBits:
     With ``toggling``, bit 10 is the parity of ``syncs`` in the cyclic modes.
     """
 
-    def __init__(self, objects: ObjectDictionary, motion: Motion, *, toggling: bool) -> None:
+    def __init__(self, objects: ObjectDictionary, motion: DriveMotion, *, toggling: bool) -> None:
         self._objects, self._motion, self._toggling = objects, motion, toggling
         self.following_error = False
         self.syncs = 0
@@ -57,15 +57,15 @@ class StatusBits:
         """Below the velocity threshold (606Fh) for the time 6070h."""
         return self._slow_time > self._motion.settings.limits.slow_time
 
-    def word(self, state: State) -> int:
+    def word(self, state: PowerState) -> int:
         """Status word (6041h) in a state."""
-        if state is State.NOT_READY:
+        if state is PowerState.NOT_READY:
             return 0
         word = int(state) | _VOLTAGE | _REMOTE
         still = self._motion.at_rest(self._speed)
-        if state is State.QUICK_STOP_ACTIVE and still:
+        if state is PowerState.QUICK_STOP_ACTIVE and still:
             word |= _REACHED
-        if state is not State.OPERATION_ENABLED:
+        if state is not PowerState.OPERATION_ENABLED:
             return word
         word |= _LIMIT if self._motion.demand.limited else 0
         return word | self._mode_bits(still)

@@ -19,7 +19,7 @@ _TIMES = {0x03: 1.0, 0x47: 60.0}
 
 
 @dataclass(frozen=True)
-class Units:
+class CountUnits:
     """SI value of one count."""
 
     angle: float
@@ -30,7 +30,7 @@ class Units:
     """Of 6077h, which is in per mille of the rated torque, N m."""
 
 
-def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
+def units_of(objects: ObjectDictionary, servo: ServoSpec) -> CountUnits:
     """Units by 608Fh, 6091h, 6092h, 60A8h, 60A9h and 6076h; the device file for what is absent.
 
     A device file may also declare that the drive does not use its scale objects. By CiA 402 a
@@ -56,7 +56,7 @@ def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
         said = product_of(servo.speed_unit, "speed")
         speed = said.factor * encoder**said.encoder * (angle * gear) ** said.increments
     rated = objects.number(0x6076, 0, 0) * 1e-3 or servo.rated_torque
-    return Units(angle * gear, speed, rated * 1e-3)
+    return CountUnits(angle * gear, speed, rated * 1e-3)
 
 
 def _angle_of(code: int) -> float:

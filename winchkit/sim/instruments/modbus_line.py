@@ -75,7 +75,7 @@ _START_TIMEOUT = 5.0
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
-class ModbusLine:
+class SimulatedModbusLine:
     """One Modbus server with several instruments by unit id: over TCP, or RTU where ``serial``.
 
     ``up_to_date`` is entered on this line's thread before registers are read or written: it

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from winchkit.schema.devices.modbus import StatusMeaning
 from winchkit.schema.devices.process import ProcessSpec
-from winchkit.sim.drive.nmt import Heartbeats, NmtState
+from winchkit.sim.drive.nmt import Heartbeats, NodeState
 from winchkit.sim.drive.object_dictionary import Abort, Entry, Key, ObjectDictionary, read_eds
 from winchkit.sim.drive.pdo import Pdos
 from winchkit.sim.drive.sdo import SdoServer
 from winchkit.sim.instruments.instrument import SimulatedInstrument, status_word
 
-_NMT = {0x01: NmtState.OPERATIONAL, 0x02: NmtState.STOPPED, 0x80: NmtState.PRE_OPERATIONAL}
+_NMT = {0x01: NodeState.OPERATIONAL, 0x02: NodeState.STOPPED, 0x80: NodeState.PRE_OPERATIONAL}
 _RESET = (0x81, 0x82)
 _SYNC = 0x1005
 """CiA 301: COB-ID SYNC."""
@@ -24,7 +24,7 @@ _NO_NUMBER = 0x7FC00000
 """A quiet NaN as REAL32."""
 
 
-class ProcessInstrument(SimulatedInstrument):
+class SimulatedProcessInstrument(SimulatedInstrument):
     """One node. ``measure`` returns the present quantity in the unit of the device file.
 
     ``send`` takes an identifier and data.
@@ -57,7 +57,7 @@ class ProcessInstrument(SimulatedInstrument):
         self._heartbeats = Heartbeats(
             self.objects, self._send_heartbeat, lambda _node: None, lambda: None
         )
-        self.nmt = NmtState.BOOTING
+        self.nmt = NodeState.BOOTING
         self._write()
 
     # Time.
@@ -76,26 +76,26 @@ class ProcessInstrument(SimulatedInstrument):
     def tick(self, now: float) -> None:
         """Evaluate the network's timers."""
         self.show(now)
-        if self.nmt is NmtState.BOOTING:
+        if self.nmt is NodeState.BOOTING:
             self._send(0x700 + self.node, b"\0")
-            self.nmt = NmtState.PRE_OPERATIONAL
+            self.nmt = NodeState.PRE_OPERATIONAL
             self._heartbeats.start(now)
         self._heartbeats.produce(now)
-        if self.nmt is NmtState.OPERATIONAL:
+        if self.nmt is NodeState.OPERATIONAL:
             self._pdos.poll(now)
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the bus."""
-        if "silence" in self.faults or self.nmt is NmtState.BOOTING:
+        if "silence" in self.faults or self.nmt is NodeState.BOOTING:
             return
         if identifier == 0x000 and len(data) == 2 and data[1] in (0, self.node):
             self._manage(data[0])
-        elif identifier == 0x600 + self.node and self.nmt is not NmtState.STOPPED:
+        elif identifier == 0x600 + self.node and self.nmt is not NodeState.STOPPED:
             self.show(now)
             reply = self._sdo.answer(data)
             if reply is not None:
                 self._send(0x580 + self.node, reply)
-        elif identifier == self.objects.number(_SYNC) & 0x7FF and self.nmt is NmtState.OPERATIONAL:
+        elif identifier == self.objects.number(_SYNC) & 0x7FF and self.nmt is NodeState.OPERATIONAL:
             self.show(now)
             self._pdos.on_sync(now)
 
@@ -118,7 +118,7 @@ class ProcessInstrument(SimulatedInstrument):
         self._sdo.reset()
         self._pdos.rebuild()
         self._write()
-        self.nmt = NmtState.BOOTING
+        self.nmt = NodeState.BOOTING
 
     def _send(self, identifier: int, data: bytes) -> None:
         if "silence" not in self.faults:

@@ -12,7 +12,7 @@ from winchkit.sim.instruments.stream_frames import IndicatorState, Speech, examp
 from winchkit.units import convert, dimension_of, factor
 
 
-class StreamInstrument(SimulatedInstrument):
+class SimulatedStreamInstrument(SimulatedInstrument):
     """One device on a serial line, with input :meth:`receive` and output :meth:`take_output`.
 
     ``measure`` returns the present quantity in counts of the device (:func:`shown_by`).

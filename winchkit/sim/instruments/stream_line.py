@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from winchkit.errors import ConnectionLost
-from winchkit.sim.instruments.stream import StreamInstrument
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument
 
 _TICK = 2e-3
 """s: a conversion is sent that much late, a tenth of the period of a cell of 50 Hz."""
@@ -22,7 +22,7 @@ _AT_ONCE = 4096
 """Bytes: more than any command, the buffer of a pseudo-terminal."""
 
 
-class StreamLine:
+class SimulatedStreamLine:
     """One serial line with its instruments, reached at :attr:`port`.
 
     ``up_to_date`` is entered on this line's thread: it advances the simulation to the present time
@@ -32,7 +32,7 @@ class StreamLine:
 
     def __init__(
         self,
-        instruments: Sequence[StreamInstrument],
+        instruments: Sequence[SimulatedStreamInstrument],
         up_to_date: Callable[[], AbstractContextManager[None]],
         now: Callable[[], float],
     ) -> None:

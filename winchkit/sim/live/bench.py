@@ -17,16 +17,16 @@ from winchkit import wings
 from winchkit.errors import NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.programme import ALL, Step
+from winchkit.schema.programme import ALL, ProgrammeStep
 from winchkit.schema.simbench import FaultSpec, SimBench, WinchTruth
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.clock.can_bus import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench_file import write_bench
-from winchkit.sim.live.buses import TICK, CanPort, Interface, Wire, serve, wired
+from winchkit.sim.live.buses import TICK, BusWire, CanPort, Interface, serve, wired
 from winchkit.sim.live.instruments import Line, Placed, open_line
 from winchkit.sim.live.winch import LiveWinch
-from winchkit.sim.plant.hanging_load import Load
+from winchkit.sim.plant.hanging_load import CableLoad
 
 
 class SimulatedRobot(Protocol):
@@ -42,7 +42,7 @@ class SimulatedRobot(Protocol):
     """Called with each datagram of the tracker, also in simulated time."""
 
     @property
-    def ends(self) -> Mapping[str, Load]:
+    def ends(self) -> Mapping[str, CableLoad]:
         """End of each winch's cable."""
 
     def advance(self, now: float) -> None:
@@ -121,7 +121,7 @@ class LiveBench:
         self._threads: list[int] = []
         self._ports: dict[str, CanPort | SimulatedCanBus] = {}
         self._lines: dict[str, Line] = {}
-        self.wire: dict[str, Wire] = {}
+        self.wire: dict[str, BusWire] = {}
         """Wires of the CAN buses, by bus."""
         self.winches: dict[str, LiveWinch] = {}
         self.robot: SimulatedRobot | None = None
@@ -170,12 +170,12 @@ class LiveBench:
         """
         return write_bench(self.bench_spec, Path(path))
 
-    def answer(self, step: Step) -> None:
+    def answer(self, step: ProgrammeStep) -> None:
         """Execute an operator request of a programme: its ``load_mass``, its ``temperature``.
 
         Parameters
         ----------
-        step : Step
+        step : ProgrammeStep
             A step with ``ask``.
         """
         for name in self.winches if step.winch == ALL else [step.winch]:
@@ -283,7 +283,7 @@ class LiveBench:
         for name, bus in declared.bus.items():
             if bus.kind == "can":
                 buses[name] = wired(bus, f"{declared.name}-{name}", self._interface)
-                self.wire[name] = Wire(self._clock, seed=self.seed)
+                self.wire[name] = BusWire(self._clock, seed=self.seed)
                 self._ports[name] = self._can_port(name, buses[name])
         self._make_winches()
         for fault in self._faults:
@@ -324,7 +324,7 @@ class LiveBench:
 
     def _make_winches(self) -> None:
         sim, now = self.sim_bench, self._now()
-        loads: Mapping[str, Load] = {}
+        loads: Mapping[str, CableLoad] = {}
         truth: Mapping[str, WinchTruth] = sim.truth
         if sim.platform is None:
             profiles = profiles_of(sim) if self._profiles is None else self._profiles

@@ -42,7 +42,7 @@ class _Trouble:
     """Delay, s; None for a lost frame."""
 
 
-class Wire:
+class BusWire:
     """Connection between the simulated drives and the other nodes of one bus.
 
     ``taps`` are called with every frame, in the order of their arrival at the other end. Safe to
@@ -151,7 +151,7 @@ def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
     )
 
 
-class _Library:
+class _AnyInterface:
     """Any interface of python-can."""
 
     def __init__(self, spec: BusSpec) -> None:
@@ -177,18 +177,18 @@ class CanPort:
     ``wire`` is between the simulated drives and the bus.
     """
 
-    def __init__(self, spec: BusSpec, wire: Wire) -> None:
+    def __init__(self, spec: BusSpec, wire: BusWire) -> None:
         self.wire = wire
         self.waited = 0.0
         """How long the last frame waited for being received, s; 0 without time stamps."""
         self._name = f"{spec.interface} channel '{spec.channel}'"
         try:
             if spec.interface == "udp_multicast":
-                self._bus: MulticastPort | _Library = MulticastPort(
+                self._bus: MulticastPort | _AnyInterface = MulticastPort(
                     str(spec.channel), int(spec.port or 0)
                 )
             else:
-                self._bus = _Library(spec)
+                self._bus = _AnyInterface(spec)
         except (can.CanError, OSError, ValueError, ImportError) as error:
             raise ConnectionLost(self._trouble(spec, error)) from error
         if spec.interface == "udp_multicast":

@@ -10,7 +10,7 @@ import socket
 from pathlib import Path
 
 from winchkit.errors import ConnectionLost, DeviceRefused
-from winchkit.schema.programme import Step
+from winchkit.schema.programme import ProgrammeStep
 
 REFUSED = "refused: "
 """Start of the reply to a line that could not be executed."""
@@ -46,7 +46,7 @@ def send(bench_file: str | Path, line: str) -> str:
     return reply
 
 
-def answer(bench_file: str | Path, step: Step) -> bool:
+def answer(bench_file: str | Path, step: ProgrammeStep) -> bool:
     """Execute an operator request of a programme, where the bench is simulated.
 
     ``step``: a step with ``ask``; its ``load_mass`` and ``temperature`` are set. Returns: True

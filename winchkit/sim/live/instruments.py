@@ -15,13 +15,13 @@ from winchkit.schema.devices.device import DeviceSpec
 from winchkit.sim.clock.serial_line import SimulatedSerialLine
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
-from winchkit.sim.instruments.modbus_line import ModbusLine
-from winchkit.sim.instruments.process import ProcessInstrument
-from winchkit.sim.instruments.stream import StreamInstrument, shown_by
-from winchkit.sim.instruments.stream_line import StreamLine
+from winchkit.sim.instruments.modbus_line import SimulatedModbusLine
+from winchkit.sim.instruments.process import SimulatedProcessInstrument
+from winchkit.sim.instruments.stream import SimulatedStreamInstrument, shown_by
+from winchkit.sim.instruments.stream_line import SimulatedStreamLine
 from winchkit.units import dimension_of, factor
 
-Instrument = ModbusInstrument | StreamInstrument | ProcessInstrument
+Instrument = ModbusInstrument | SimulatedStreamInstrument | SimulatedProcessInstrument
 Send = Callable[[int, bytes], None]
 """Sends an identifier and data to a CAN bus."""
 
@@ -62,17 +62,17 @@ def _instrument(
         return ModbusInstrument(device.modbus, in_unit_of(device.modbus, measure), now=now)
     if device.stream is not None:
         shown = shown_by(device.stream, measure)
-        return StreamInstrument(device.stream, shown, now=now, address=ref.unit)
+        return SimulatedStreamInstrument(device.stream, shown, now=now, address=ref.unit)
     if device.process is not None and ref.node is not None:
         spec = device.process
         size = factor(spec.unit, dimension_of(spec.unit) or "")
-        return ProcessInstrument(
+        return SimulatedProcessInstrument(
             spec, path.parent / spec.eds, ref.node, lambda: measure() / size, send, now=now
         )
     raise FileError(f"{path}: '{ref.device}' is not an instrument that can be simulated here")
 
 
-Line = ModbusLine | StreamLine | SimulatedSerialLine
+Line = SimulatedModbusLine | SimulatedStreamLine | SimulatedSerialLine
 
 
 class Placed(NamedTuple):
@@ -100,12 +100,14 @@ def open_line(
     _refuse_shared(instruments)
     if bus.kind == "serial":
         streams = [
-            one.instrument for one in instruments if isinstance(one.instrument, StreamInstrument)
+            one.instrument
+            for one in instruments
+            if isinstance(one.instrument, SimulatedStreamInstrument)
         ]
         stream_line = (
             SimulatedSerialLine(streams, up_to_date, time)
             if isinstance(time, SimulatedClock)
-            else StreamLine(streams, up_to_date, time)
+            else SimulatedStreamLine(streams, up_to_date, time)
         )
         stream_line.start()
         return stream_line, replace(bus, port=stream_line.port)
@@ -115,7 +117,7 @@ def open_line(
         if isinstance(one.instrument, ModbusInstrument) and one.ref.unit is not None
     }
     clock = time if isinstance(time, SimulatedClock) else None
-    modbus_line = ModbusLine(units, up_to_date, clock=clock)
+    modbus_line = SimulatedModbusLine(units, up_to_date, clock=clock)
     modbus_line.start()
     host, port = modbus_line.address
     return modbus_line, BusSpec("modbus-tcp", host=host, port=port, timeout=bus.timeout)
@@ -124,7 +126,7 @@ def open_line(
 def _refuse_shared(instruments: list[Placed]) -> None:
     taken: set[int | None] = set()
     for one in instruments:
-        alone = isinstance(one.instrument, StreamInstrument) and len(instruments) == 1
+        alone = isinstance(one.instrument, SimulatedStreamInstrument) and len(instruments) == 1
         if one.ref.unit in taken or (one.ref.unit is None and not alone):
             raise UsageError(f"{one.where} needs a unit of its own on the bus '{one.ref.bus}'")
         taken.add(one.ref.unit)

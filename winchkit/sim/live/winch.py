@@ -17,9 +17,9 @@ from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.sim.drive.drive import SimDrive
 from winchkit.sim.drive.faults import known
 from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
-from winchkit.sim.instruments.process import ProcessInstrument
+from winchkit.sim.instruments.process import SimulatedProcessInstrument
 from winchkit.sim.live.instruments import device_of, instruments_of
-from winchkit.sim.plant.hanging_load import Load
+from winchkit.sim.plant.hanging_load import CableLoad
 from winchkit.sim.plant.plant import WinchPlant
 
 _QUANTITIES = {
@@ -61,7 +61,7 @@ class LiveWinch:
         beside: str,
         now: float,
         clocks_deviate: bool = False,
-        load: Load | None = None,
+        load: CableLoad | None = None,
     ) -> None:
         self.name = name
         step = _STEP if load is None else _ROBOT_STEP
@@ -90,7 +90,7 @@ class LiveWinch:
         measuring = {role: partial(read, quantity) for role, quantity in _QUANTITIES.items()}
         self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
         devices = list(self.instruments.values())
-        self._on_can = [one for one in devices if isinstance(one, ProcessInstrument)]
+        self._on_can = [one for one in devices if isinstance(one, SimulatedProcessInstrument)]
         self._devices = devices
         self._conversion_due = self._next_conversion()
         if clocks_deviate:

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar
 
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 Stiffness = Annotated[float, Quantity("stiffness", 0.0, above=True)]
 Viscosity = Annotated[float, Quantity("viscosity")]
@@ -25,12 +25,12 @@ _MOTOR_STANDSTILL = 0.01
 """
 
 
-def winding_direction(state: State) -> float:
+def winding_direction(state: PlantState) -> float:
     """Direction of the cable, +1 winding in, sharp to about 0.02 mm/s of standstill."""
     return tanh(state.winding_speed / _CABLE_STANDSTILL)
 
 
-def motor_direction(state: State) -> float:
+def motor_direction(state: PlantState) -> float:
     """Direction of the motor, sharp to about 0.01 rad/s of standstill."""
     return tanh(state.motor_speed / _MOTOR_STANDSTILL)
 
@@ -59,47 +59,49 @@ class Physics:
         """Inertia that the motor accelerates in addition to the load, kg m²."""
         return 0.0
 
-    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+    def drum_angle(self, state: PlantState, dt: float) -> tuple[float, float, float]:
         """Angle added to the drum angle, its slope by the drum angle, and its rate in time."""
         raise NotImplementedError
 
-    def wound_length(self, state: State) -> tuple[float, float]:
+    def wound_length(self, state: PlantState) -> tuple[float, float]:
         """Length added to the wound length, and its slope by the drum angle, m and m/rad."""
         raise NotImplementedError
 
-    def compliance(self, state: State) -> float:
+    def compliance(self, state: PlantState) -> float:
         """Elongation per tension at the platform, m/N."""
         raise NotImplementedError
 
-    def stretch(self, state: State, dt: float) -> float:
+    def stretch(self, state: PlantState, dt: float) -> float:
         """Elongation other than that of a linear spring, m."""
         raise NotImplementedError
 
-    def weight(self, state: State) -> float:
+    def weight(self, state: PlantState) -> float:
         """Tension added between the platform and the pulleys, N."""
         raise NotImplementedError
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         """Tension added by one pulley, wrap in rad, to that on its platform side, N."""
         raise NotImplementedError
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         """Reading of the load cell after this effect, N."""
         raise NotImplementedError
 
-    def gear(self, state: State, torque: float) -> float:
+    def gear(self, state: PlantState, torque: float) -> float:
         """Torque at the motor that carries ``torque`` of the cable, N m."""
         raise NotImplementedError
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         """Torque for the motor itself, N m."""
         raise NotImplementedError
 
-    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+    def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         """Torque reported by the drive after this effect, N m."""
         raise NotImplementedError
 
-    def length_signal(self, state: State, reading: float, dt: float) -> float:
+    def length_signal(self, state: PlantState, reading: float, dt: float) -> float:
         """Reading of the length instrument after this effect, m."""
         raise NotImplementedError
 

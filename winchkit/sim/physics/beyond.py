@@ -16,7 +16,7 @@ from winchkit.schema.quantity import (
     Quantity,
 )
 from winchkit.sim.physics.base import Physics, Stiffness, winding_direction
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 
 @dataclass
@@ -27,7 +27,7 @@ class FiveCornerDrum(Physics):
     order: PositiveNumber = 5.0
     size: ClassVar[str] = "amplitude"
 
-    def wound_length(self, state: State) -> tuple[float, float]:
+    def wound_length(self, state: PlantState) -> tuple[float, float]:
         angle = self.order * state.drum_angle
         return self.amplitude * sin(angle), self.amplitude * self.order * cos(angle)
 
@@ -42,7 +42,7 @@ class TorqueCrosstalk(Physics):
     """Periods per motor torque of 1 N m, by rectification."""
     size: ClassVar[str] = "per_torque"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.per_torque * sin(2 * pi * self.wave * state.motor_torque)
 
 
@@ -55,7 +55,7 @@ class TemperatureCrosstalk(Physics):
     """Period, K."""
     size: ClassVar[str] = "swing"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.swing * sin(2 * pi * state.temperature / self.period)
 
 
@@ -69,7 +69,9 @@ class StickyPlace(Physics):
     width: PositiveLength = 0.1
     size: ClassVar[str] = "force"
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         """Friction at the first pulley of the drum, against the motion, around the position."""
         if index != 0:
             return 0.0
@@ -88,7 +90,7 @@ class GivingJoint(Physics):
     _opening: float = 0.0
     _SETTLE: ClassVar[float] = 0.01
 
-    def stretch(self, state: State, dt: float) -> float:
+    def stretch(self, state: PlantState, dt: float) -> float:
         """Opening in proportion to the excess of tension, with a time constant of some 10 ms."""
         goal = max(0.0, state.load - self.above) / self.stiffness
         self._opening += (goal - self._opening) * (1.0 - exp(-dt / self._SETTLE))
@@ -103,5 +105,5 @@ class WanderingLength(Physics):
     period: PositiveDuration = 7.0
     size: ClassVar[str] = "amplitude"
 
-    def length_signal(self, state: State, reading: float, dt: float) -> float:
+    def length_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.amplitude * sin(2 * pi * state.time / self.period)

@@ -16,7 +16,7 @@ from winchkit.schema.quantity import (
 )
 from winchkit.sim.physics.base import Expansion, Physics, Stiffness
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 from winchkit.units import GRAVITY
 
 _WARM = 20.0
@@ -31,7 +31,7 @@ class ElasticCable(Physics):
     size: ClassVar[str] = "axial_stiffness"
     inverse: ClassVar[bool] = True
 
-    def compliance(self, state: State) -> float:
+    def compliance(self, state: PlantState) -> float:
         return (state.unstrained + state.dead_length) / self.axial_stiffness
 
 
@@ -43,7 +43,7 @@ class SoftFrame(Physics):
     size: ClassVar[str] = "stiffness"
     inverse: ClassVar[bool] = True
 
-    def compliance(self, state: State) -> float:
+    def compliance(self, state: PlantState) -> float:
         return 1.0 / self.stiffness
 
 
@@ -54,7 +54,7 @@ class WarmCable(Physics):
     expansion: Expansion = 1.1e-5
     size: ClassVar[str] = "expansion"
 
-    def stretch(self, state: State, dt: float) -> float:
+    def stretch(self, state: PlantState, dt: float) -> float:
         strain = self.expansion * (state.temperature - _WARM)
         return strain * (state.unstrained + state.dead_length)
 
@@ -69,7 +69,7 @@ class CreepingCable(Physics):
     inverse: ClassVar[bool] = True
     _strain: float = 0.0
 
-    def stretch(self, state: State, dt: float) -> float:
+    def stretch(self, state: PlantState, dt: float) -> float:
         """First-order creep, stepped exactly at constant tension."""
         goal = state.load / self.creep_stiffness
         self._strain += (goal - self._strain) * (1.0 - exp(-dt / self.time_constant))
@@ -91,7 +91,7 @@ class LaggingCable(Physics):
     _before: float | None = None
     _SLOPE: ClassVar[float] = 0.5
 
-    def stretch(self, state: State, dt: float) -> float:
+    def stretch(self, state: PlantState, dt: float) -> float:
         """Strain withheld by friction, times the stressed length; a Dahl law in tension."""
         change = 0.0 if self._before is None else state.load - self._before
         self._before = state.load
@@ -106,7 +106,7 @@ class HeavyCable(Physics):
     mass_per_length: LinearDensity = 0.15
     size: ClassVar[str] = "mass_per_length"
 
-    def weight(self, state: State) -> float:
+    def weight(self, state: PlantState) -> float:
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)
 
 
@@ -118,5 +118,5 @@ class LoadLever(Physics):
     phase: Angle = 0.3
     size: ClassVar[str] = "amplitude"
 
-    def weight(self, state: State) -> float:
+    def weight(self, state: PlantState) -> float:
         return state.load * self.amplitude * sin(state.drum_angle + self.phase)

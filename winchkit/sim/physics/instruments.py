@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 from winchkit.schema.quantity import Force, Number, PositiveDuration, PositiveForce, Quantity
 from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 
 @dataclass
@@ -19,7 +19,7 @@ class StretchedCell(Physics):
     gain_error: Number = 0.02
     size: ClassVar[str] = "gain_error"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)
 
 
@@ -30,7 +30,7 @@ class ShiftedCell(Physics):
     offset: Force = 4.0
     size: ClassVar[str] = "offset"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.offset
 
 
@@ -41,7 +41,7 @@ class BentCell(Physics):
     quadratic: Force = 25.0
     size: ClassVar[str] = "quadratic"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.quadratic * (state.tension / 500.0) ** 2
 
 
@@ -52,7 +52,7 @@ class DriftingCell(Physics):
     drift: ForceDrift = 0.4
     size: ClassVar[str] = "drift"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.drift * state.time
 
 
@@ -63,7 +63,7 @@ class WarmCell(Physics):
     sensitivity: ThermalForce = 0.5
     size: ClassVar[str] = "sensitivity"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.sensitivity * (state.temperature - 20.0)
 
 
@@ -75,7 +75,7 @@ class SlowCell(Physics):
     size: ClassVar[str] = "time_constant"
     _value: float | None = None
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         """First-order lag, stepped exactly for a held input."""
         if self._value is None:
             self._value = reading
@@ -91,7 +91,7 @@ class ClippingCell(Physics):
     share: Annotated[float, Quantity("ratio", 0.0, 1.0)] = 1.0
     size: ClassVar[str] = "share"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading - self.share * max(0.0, reading - self.limit)
 
 
@@ -103,7 +103,7 @@ class LeakingCurrent(Physics):
     """N per N m of motor torque."""
     size: ClassVar[str] = "share"
 
-    def cell(self, state: State, reading: float, dt: float) -> float:
+    def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.share * state.motor_torque
 
 
@@ -115,7 +115,7 @@ class LateLength(Physics):
     size: ClassVar[str] = "delay"
     _past: deque[tuple[float, float]] = field(default_factory=deque)
 
-    def length_signal(self, state: State, reading: float, dt: float) -> float:
+    def length_signal(self, state: PlantState, reading: float, dt: float) -> float:
         """Interpolate the past values; before the start, the first value."""
         past = self._past
         past.append((state.time, reading))

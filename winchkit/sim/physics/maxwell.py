@@ -13,7 +13,7 @@ from typing import ClassVar
 from winchkit.schema.quantity import Number, PositiveSpeed
 from winchkit.sim.physics.base import Physics, Stiffness
 from winchkit.sim.physics.pulley import pressure
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 _ELEMENTS = 4
 """The chords of four elements differ from the parabola of infinitely many by at most 1.6 % (1/64)
@@ -35,7 +35,9 @@ class MaxwellPulleys(Physics):
     size: ClassVar[str] = "friction"
     _forces: dict[int, list[float]] = field(default_factory=dict)
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         """Sum of the elements, each limited to its share of the sliding force."""
         forces = self._forces.setdefault(index, [0.0] * _ELEMENTS)
         speed = state.winding_speed

@@ -22,7 +22,7 @@ from winchkit.sim.physics.base import (
     winding_direction,
 )
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 AngularSpeed = Annotated[float, Quantity("angular speed", 0.0, above=True)]
 Efficiency = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
@@ -34,7 +34,7 @@ class LossyGear(Physics):
 
     efficiency: Efficiency = 0.94
 
-    def gear(self, state: State, torque: float) -> float:
+    def gear(self, state: PlantState, torque: float) -> float:
         """Divide by the efficiency winding in, multiply paying out."""
         return float(torque * self.efficiency ** -winding_direction(state))
 
@@ -46,7 +46,7 @@ class MotorDrag(Physics):
     torque: Torque = 0.025
     size: ClassVar[str] = "torque"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return motor_direction(state) * self.torque
 
 
@@ -57,7 +57,7 @@ class MotorGrease(Physics):
     viscosity: RotationalViscosity = 1.5e-4
     size: ClassVar[str] = "viscosity"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.viscosity * state.motor_speed
 
 
@@ -68,7 +68,7 @@ class OneWayGrease(Physics):
     viscosity_difference: RotationalViscosity = 1e-4
     size: ClassVar[str] = "viscosity_difference"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.viscosity_difference * abs(state.motor_speed)
 
 
@@ -80,7 +80,7 @@ class MotorStiction(Physics):
     stribeck_speed: AngularSpeed = 20.0
     size: ClassVar[str] = "torque"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
         return motor_direction(state) * self.torque * fall
 
@@ -95,7 +95,7 @@ class PreslidingMotor(Physics):
     _force: float = 0.0
     _angle: float | None = None
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         travel = 0.0 if self._angle is None else state.motor_angle - self._angle
         slope = self.torque / self.distance
         self._force = relax(self._force, travel, self.torque, slope, 1.0)
@@ -112,7 +112,7 @@ class Cogging(Physics):
     phase: Angle = 0.3
     size: ClassVar[str] = "amplitude"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.amplitude * sin(self.order * state.motor_angle + self.phase)
 
 
@@ -125,7 +125,7 @@ class RippledMotor(Physics):
     phase: Angle = 0.3
     size: ClassVar[str] = "amplitude"
 
-    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+    def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.amplitude * sin(self.order * state.motor_angle + self.phase))
 
 
@@ -137,7 +137,7 @@ class UnbalancedDrum(Physics):
     phase: Angle = 0.3
     size: ClassVar[str] = "amplitude"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.amplitude * sin(state.drum_angle + self.phase)
 
 
@@ -156,7 +156,7 @@ class Balancer(Physics):
     torque: Torque = 0.02
     size: ClassVar[str] = "stiffness"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.stiffness * state.drum_angle + self.torque
 
 
@@ -167,7 +167,7 @@ class GrowingDrag(Physics):
     rate: Annotated[float, Quantity("torque per time")] = 1e-3
     size: ClassVar[str] = "rate"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return motor_direction(state) * self.rate * state.time
 
 
@@ -180,7 +180,7 @@ class RoughPlace(Physics):
     width: Annotated[float, Quantity("angle", 0.0, above=True)] = 2.0
     size: ClassVar[str] = "torque"
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         distance = (state.drum_angle - self.place) / self.width
         return motor_direction(state) * self.torque * exp(-distance * distance)
 
@@ -195,7 +195,7 @@ class HeavyRotor(Physics):
     def rotor_inertia(self) -> float:
         return self.inertia
 
-    def motor(self, state: State) -> float:
+    def motor(self, state: PlantState) -> float:
         return self.inertia * state.motor_acceleration
 
 
@@ -206,7 +206,7 @@ class WeakMotor(Physics):
     gain_error: Number = 0.05
     size: ClassVar[str] = "gain_error"
 
-    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+    def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)
 
 
@@ -218,7 +218,7 @@ class SlowTorque(Physics):
     size: ClassVar[str] = "time_constant"
     _value: float | None = None
 
-    def torque_signal(self, state: State, reading: float, dt: float) -> float:
+    def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         """First-order lag, stepped exactly for a held input."""
         if dt == 0.0:
             return reading

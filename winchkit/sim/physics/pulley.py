@@ -9,7 +9,7 @@ from typing import ClassVar
 from winchkit.schema.quantity import Mass, Number, PositiveNumber, PositiveSpeed
 from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, winding_direction
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 
 def pressure(before: float, after: float, wrap: float) -> float:
@@ -33,7 +33,9 @@ class StickyPulleys(Physics):
     friction: Number = 0.01
     size: ClassVar[str] = "friction"
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         return _dragged(tension, wrap, winding_direction(state) * self.friction)
 
 
@@ -47,7 +49,9 @@ class PreslidingPulleys(Physics):
     size: ClassVar[str] = "friction"
     _force: dict[int, float] = field(default_factory=dict)
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         force = self._force.get(index, 0.0)
         limit = self.friction * pressure(tension, tension + force, wrap)
         force = relax(force, state.winding_speed * dt, limit, self.stiffness, self.shape)
@@ -62,7 +66,9 @@ class ViscousPulleys(Physics):
     viscosity: Viscosity = 8.0
     size: ClassVar[str] = "viscosity"
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         return self.viscosity * state.winding_speed
 
 
@@ -75,7 +81,9 @@ class CreepPulleys(Physics):
     stribeck_speed: PositiveSpeed = 0.04
     size: ClassVar[str] = "static"
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         fall = exp(-((state.winding_speed / self.stribeck_speed) ** 2))
         friction = self.coulomb + (self.static - self.coulomb) * fall
         return _dragged(tension, wrap, winding_direction(state) * friction)
@@ -88,5 +96,7 @@ class HeavyPulleys(Physics):
     equivalent_mass: Mass = 1.0
     size: ClassVar[str] = "equivalent_mass"
 
-    def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
+    def pulley(
+        self, state: PlantState, index: int, wrap: float, tension: float, dt: float
+    ) -> float:
         return self.equivalent_mass * state.winding_acceleration

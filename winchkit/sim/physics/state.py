@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class State:
+class PlantState:
     """Present true state; SI, mutable, owned by the plant."""
 
     time: float = 0.0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from winchkit.errors import Fault, FileError, suggest
 from winchkit.schema.profiles.winch import WinchProfile
@@ -135,16 +135,25 @@ def scaled(spec: HiddenSpec, factor: float) -> HiddenSpec:
     )
 
 
-def listed_physics() -> list[dict[str, object]]:
-    """Every effect: name, description, and its parameters of typical size."""
+@dataclass(frozen=True)
+class ListedPhysics:
+    """What a simulated bench can hide, with numbers of a typical size."""
+
+    name: str
+    description: str
+    numbers: Mapping[str, str | float]
+
+
+def listed_physics() -> list[ListedPhysics]:
+    """Every effect of a simulated bench."""
     return [
-        {
-            "name": name,
-            "description": (kind.__doc__ or "").partition("\n")[0],
-            "numbers": {
+        ListedPhysics(
+            name,
+            (kind.__doc__ or "").partition("\n")[0],
+            {
                 number: with_unit(kind, number, getattr(kind(), number))
                 for number in number_names(kind)
             },
-        }
+        )
         for name, kind in PHYSICS.items()
     ]

@@ -10,7 +10,7 @@ from winchkit.errors import FileError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
 from winchkit.sim.physics.base import Physics, motor_direction
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 _SLIP_TIME = 0.4
 """s: short against a stroke, many steps of the integration."""
@@ -64,7 +64,7 @@ class EccentricDrum(Physics):
     phase: Angle = 0.7
     size: ClassVar[str] = "eccentricity"
 
-    def wound_length(self, state: State) -> tuple[float, float]:
+    def wound_length(self, state: PlantState) -> tuple[float, float]:
         """Sine of the drum angle, zero at the reference."""
         angle = state.drum_angle - self.phase
         extra = self.eccentricity * (sin(angle) + sin(self.phase))
@@ -87,7 +87,7 @@ class GuideOffset(Physics):
             raise FileError(f"hidden 'guide offset': {profile.name} has no guide")
         self._distance = profile.guide.distance
 
-    def wound_length(self, state: State) -> tuple[float, float]:
+    def wound_length(self, state: PlantState) -> tuple[float, float]:
         per_radian = self.mismatch / (2 * pi)
         aside = self.offset + per_radian * state.wound_angle
         slant = hypot(self._distance, aside)
@@ -107,7 +107,7 @@ class WavyGear(Physics):
     def begin(self, profile: WinchProfile) -> None:
         self._ratio = profile.gearbox.ratio * profile.gearbox.direction
 
-    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+    def drum_angle(self, state: PlantState, dt: float) -> tuple[float, float, float]:
         angle = self.order * state.motor_angle + self.phase
         slope = self.amplitude * self.order * cos(angle) * self._ratio
         return self.amplitude * sin(angle), slope, 0.0
@@ -121,7 +121,7 @@ class Slip(Physics):
     time: Duration = 5.0
     size: ClassVar[str] = "step"
 
-    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+    def drum_angle(self, state: PlantState, dt: float) -> tuple[float, float, float]:
         """A smooth step that takes 0.4 s."""
         x = (state.time - self.time) / _SLIP_TIME
         if x <= 0.0:
@@ -152,7 +152,7 @@ class LooseGear(Physics):
         self._ratio = profile.gearbox.ratio
         self._radius = profile.drum.winding_radius
 
-    def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
+    def drum_angle(self, state: PlantState, dt: float) -> tuple[float, float, float]:
         driven = state.drum_angle
         half = self.gap / 2
         if self._drum is None:
@@ -164,5 +164,5 @@ class LooseGear(Physics):
         self._drum = min(max(self._drum, low), high)
         return self._drum - driven, -1.0 if inside else 0.0, 0.0
 
-    def gear(self, state: State, torque: float) -> float:
+    def gear(self, state: PlantState, torque: float) -> float:
         return torque + motor_direction(state) * self.drag / self._ratio

@@ -14,7 +14,7 @@ CLIMB = 0.1
 """Angle over which a cable climbs to the next turn of a spiral, rad; zero in Eq. 2."""
 
 
-class Drum(ABC):
+class PlantDrum(ABC):
     """Cable on a drum: all angles are the total wound angle in rad, all lengths in m."""
 
     @abstractmethod
@@ -27,7 +27,7 @@ class Drum(ABC):
 
 
 @dataclass(frozen=True)
-class Spiral(Drum):
+class GrowingDrum(PlantDrum):
     """The radius of every turn is larger by ``growth`` (Eq. 2 of the CABTIVE paper).
 
     The corner between two turns is rounded over ``climb`` rad, which moves the length by at
@@ -72,7 +72,7 @@ class Spiral(Drum):
 
 
 @dataclass(frozen=True)
-class Growing(Drum):
+class Growing(PlantDrum):
     """The radius grows in proportion to the angle: archimedean, and r² = r0² + kL."""
 
     radius: float
@@ -94,7 +94,7 @@ class Growing(Drum):
         return (sqrt(inside) - self.radius) / self.slope
 
 
-def drum_of(profile: WinchProfile, climb: float = 0.0) -> Drum:
+def drum_of(profile: WinchProfile, climb: float = 0.0) -> PlantDrum:
     """Build the winding law of a profile; raises UsageError where a number is missing."""
     spec = profile.drum
     if spec.kind == "grooved":
@@ -112,5 +112,5 @@ def drum_of(profile: WinchProfile, climb: float = 0.0) -> Drum:
             f"for a drum of kind {spec.kind}"
         )
     if spec.kind == "spiral":
-        return Spiral(spec.winding_radius, growth, climb)
+        return GrowingDrum(spec.winding_radius, growth, climb)
     return Growing(spec.winding_radius, growth / _TURN)

@@ -14,7 +14,7 @@ _STIFF = 1.0
 """Natural angular frequency, in 1/step, above which the oscillation is neglected."""
 
 
-class Load(Protocol):
+class CableLoad(Protocol):
     """The load at the end of a cable, as :class:`HangingLoad`."""
 
     mass: float

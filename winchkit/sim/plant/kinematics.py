@@ -7,14 +7,14 @@ from math import pi
 
 from winchkit.errors import UsageError
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.sim.plant.drum import Drum, drum_of
+from winchkit.sim.plant.drum import PlantDrum, drum_of
 
 
 @dataclass(frozen=True)
 class Kinematics:
     """Rigid cable on a drum behind a gearbox; angles of the motor in rad, lengths in m."""
 
-    drum: Drum
+    drum: PlantDrum
     gain: float
     """Drum radians per motor radian, signed by the gearbox's direction."""
     motor_reference: float

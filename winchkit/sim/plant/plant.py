@@ -11,12 +11,12 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
 from winchkit.sim.physics.base import HOOKS, Physics
 from winchkit.sim.physics.parameters import overridden
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 from winchkit.sim.physics.table import build, declared
 from winchkit.sim.plant.drum import CLIMB
-from winchkit.sim.plant.hanging_load import HangingLoad, Load
+from winchkit.sim.plant.hanging_load import CableLoad, HangingLoad
 from winchkit.sim.plant.kinematics import Kinematics
-from winchkit.sim.plant.sensors import Instruments, Measurement
+from winchkit.sim.plant.sensors import Measurement, NoisyReadings
 from winchkit.sim.plant.servo import DriveCommand, Servo
 
 MAX_STEP = 1e-3
@@ -44,7 +44,7 @@ class WinchPlant:
         seed: int | str,
         noise: NoiseSpec | None = None,
         cable_length: float | None = None,
-        load: Load | None = None,
+        load: CableLoad | None = None,
         longest_step: float = MAX_STEP,
     ) -> None:
         self._longest_step = longest_step
@@ -59,7 +59,7 @@ class WinchPlant:
         self._servo = Servo()
         self._bind_hooks()
         length = nominal.length_reference if cable_length is None else cable_length
-        self._state = State(
+        self._state = PlantState(
             temperature=truth.temperature,
             motor_angle=nominal.motor_angle(length),
             dead_length=true.cable.dead_length,
@@ -68,7 +68,7 @@ class WinchPlant:
         self._load = load or HangingLoad(truth.load_mass, 0.0)
         self._powered = False
         self._settle()
-        self._instruments = Instruments(noise if noise is not None else NoiseSpec(), seed)
+        self._instruments = NoisyReadings(noise if noise is not None else NoiseSpec(), seed)
 
     def _bind_hooks(self) -> None:
         bound: dict[str, list[Callable[..., Any]]] = {

@@ -7,10 +7,10 @@ from random import Random
 from typing import NamedTuple
 
 from winchkit.schema.simbench import NoiseSpec
-from winchkit.sim.physics.state import State
+from winchkit.sim.physics.state import PlantState
 
 
-class Noise:
+class GaussianNoise:
     """Zero-mean Gaussian noise of standard deviation ``sigma``, sampled at any times.
 
     ``colour`` is the share of the variance in an Ornstein-Uhlenbeck process of correlation
@@ -49,13 +49,13 @@ class Measurement(NamedTuple):
     temperature: float
 
 
-class Instruments:
+class NoisyReadings:
     """Adds independent noise to every reading, reproducible by a seed."""
 
     def __init__(self, noise: NoiseSpec, seed: int | str) -> None:
         sigmas = {name: getattr(noise, name) for name in _NOISY}
         self._noise = {
-            name: Noise(sigma, noise.colour, noise.colour_time, Random(f"{seed}/{name}"))
+            name: GaussianNoise(sigma, noise.colour, noise.colour_time, Random(f"{seed}/{name}"))
             if sigma
             else None
             for name, sigma in sigmas.items()
@@ -71,7 +71,7 @@ class Instruments:
         return noise.sample(interval)
 
     def read(
-        self, state: State, *, motor_torque: float, tension: float, cable_length: float
+        self, state: PlantState, *, motor_torque: float, tension: float, cable_length: float
     ) -> Measurement:
         """Read; the arguments are outputs of drive, cell and length instrument without noise."""
         noise, time = self.noise, state.time

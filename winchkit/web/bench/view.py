@@ -84,7 +84,7 @@ class _Period:
         return self._due - now
 
 
-class LiveRobot(Protocol):
+class RobotDrawing(Protocol):
     """The robot of a bench as its wing draws it."""
 
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -111,7 +111,7 @@ class BenchView:
         self._lent = threading.Event()
         """Set while the bench is given away, so that a drive can be written to."""
         self._model = LiveModel(self.spec, self.file, self.effects)
-        live: LiveRobot | None = None
+        live: RobotDrawing | None = None
         if self.spec.robot is not None:
             live = wings.part("robot", "live_robot")(self.spec)
         self._robot = live

@@ -16,10 +16,10 @@ from drive_on_bus import DriveOnBus, bus_spec, device
 from winchkit.drivers.can.bus import bus as bus_module
 from winchkit.drivers.can.bus.bus import CanBus, FrameTime
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
-from winchkit.drivers.can.bus.socketcan import Frame
+from winchkit.drivers.can.bus.socketcan import ReceivedFrame
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 
@@ -201,7 +201,7 @@ class Interface:
     def __init__(self) -> None:
         self.library: Any = can.Bus(interface="virtual", channel=f"unused-{id(self)}")
         self.dropped = 0
-        self.frames: list[Frame] = []
+        self.frames: list[ReceivedFrame] = []
         self.sent: list[tuple[int, bytes]] = []
         self.trouble: Exception | None = None
         self.room = self.calls = 0
@@ -210,7 +210,7 @@ class Interface:
         self.closed = False
         self.controller: BusState | None = None
 
-    def receive(self, timeout: float) -> list[Frame]:
+    def receive(self, timeout: float) -> list[ReceivedFrame]:
         if self.trouble is not None:
             raise self.trouble
         if not self.frames:
@@ -264,10 +264,10 @@ def test_everything_that_goes_wrong_is_counted(bus: CanBus, interfaces: list[Int
     bus.sync()
     port.dropped = 3
     port.frames += [
-        Frame(0x181, b""),
-        Frame(0x004, bytes((0, 0x01)), error=True),
-        Frame(0x004, bytes((0, 0x10)), error=True),
-        Frame(0x701, b"\x05"),
+        ReceivedFrame(0x181, b""),
+        ReceivedFrame(0x004, bytes((0, 0x01)), error=True),
+        ReceivedFrame(0x004, bytes((0, 0x10)), error=True),
+        ReceivedFrame(0x701, b"\x05"),
     ]
     until(lambda: bus.received == 2)
     health = bus.health
@@ -363,10 +363,10 @@ def test_a_dead_interface_is_reported_once_every_frame_was_tried(
 def test_bus_off_is_a_fault_until_it_is_opened_again(
     bus: CanBus, interfaces: list[Interface]
 ) -> None:
-    interfaces[0].frames += [Frame(0x040, bytes(8), error=True)]
+    interfaces[0].frames += [ReceivedFrame(0x040, bytes(8), error=True)]
     until(lambda: bus.fault is not None)
     assert "bus off" in str(bus.fault)
-    interfaces[0].frames += [Frame(0x100, bytes(8), error=True)]
+    interfaces[0].frames += [ReceivedFrame(0x100, bytes(8), error=True)]
     until(lambda: bus.health.state is BusState.ACTIVE)
     assert bus.fault is not None, "a restart of the controller makes nothing right by itself"
     bus.reopen()
@@ -400,7 +400,7 @@ def test_an_unplugged_adapter_is_reported_and_replaced(
     assert interfaces[0].closed
     assert bus.fault is None
     assert interfaces[1].sent == [], "opening a bus says nothing on it"
-    interfaces[1].frames.append(Frame(0x181, b"alive"))
+    interfaces[1].frames.append(ReceivedFrame(0x181, b"alive"))
     until(lambda: heard == [b"alive"])
     bus.sync()
     assert interfaces[1].sent == [(0x080, b"")]
@@ -446,7 +446,7 @@ def enable(commissioned: Commissioned, velocity: float) -> None:
     drive, bus, axis = commissioned
     for number in range(1500):
         reached = drive.shaft.motor_velocity == pytest.approx(velocity, rel=0.05, abs=0.01)
-        if reached and axis.state is State.OPERATION_ENABLED:
+        if reached and axis.state is DriveState.OPERATION_ENABLED:
             return
         axis.begin_cycle(number, CLOCK.now())
         bus.sync()

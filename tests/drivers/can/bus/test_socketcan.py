@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.bus.socketcan import Frame, SocketCan, _Messages, parse_socketcan
+from winchkit.drivers.can.bus.socketcan import ReceivedFrame, SocketCan, _Messages, parse_socketcan
 
 _TIMESTAMPNS, _RXQ_OVFL = 35, 40
 _PACKET = struct.Struct("=IB3x8s")
@@ -68,7 +68,7 @@ def test_all_frames_that_wait_are_taken(
     for identifier, data in frames:
         other.send(_PACKET.pack(identifier, len(data), data))
     taken = [*port.receive(0.001), *port.receive(0.001)]
-    assert taken == [Frame(identifier, data) for identifier, data in frames]
+    assert taken == [ReceivedFrame(identifier, data) for identifier, data in frames]
 
 
 def test_frames_of_a_real_socket_have_the_time_stamp_of_the_kernel() -> None:
@@ -105,7 +105,7 @@ def test_a_frame_that_this_socket_has_sent_is_marked_by_linux(
 
     monkeypatch.setattr(port, "_recvmmsg", marked)
     other.send(_PACKET.pack(0x201, 2, b"\x06\0"))
-    assert list(port.receive(0.05)) == ([] if ours else [Frame(0x201, b"\x06\0")])
+    assert list(port.receive(0.05)) == ([] if ours else [ReceivedFrame(0x201, b"\x06\0")])
 
 
 def test_a_closed_socket_is_an_error() -> None:
@@ -120,13 +120,16 @@ def test_a_closed_socket_is_an_error() -> None:
 
 def test_frames_with_their_control_messages() -> None:
     raw = _PACKET.pack(0x181, 3, b"abcgarba")
-    assert parse_socketcan(raw, stamped(12, 500_000_000)) == (Frame(0x181, b"abc", 12.5), None)
+    assert parse_socketcan(raw, stamped(12, 500_000_000)) == (
+        ReceivedFrame(0x181, b"abc", 12.5),
+        None,
+    )
     drops = control(_RXQ_OVFL, struct.pack("=I", 7))
     for both in (stamped(12, 0) + drops, drops + stamped(12, 0)):
-        assert parse_socketcan(raw, both) == (Frame(0x181, b"abc", 12.0), 7)
+        assert parse_socketcan(raw, both) == (ReceivedFrame(0x181, b"abc", 12.0), 7)
     assert parse_socketcan(raw, control(20, bytes(3)) + drops)[1] == 7, "of another kind"
     error = _PACKET.pack(0x20000040, 8, bytes(8))
-    assert parse_socketcan(error, b"")[0] == Frame(0x40, bytes(8), 0.0, error=True)
+    assert parse_socketcan(error, b"")[0] == ReceivedFrame(0x40, bytes(8), 0.0, error=True)
 
 
 @settings(max_examples=50)

@@ -15,7 +15,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id, set_up
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, FileError
 from winchkit.schema.devices.device import DeviceSpec
@@ -146,7 +146,7 @@ def test_a_drive_is_moved_with_slower_feedback_of_its_speed(
         bus.heartbeat(127, 5)
         time.sleep(0.006)
         axis.send(RequestedState.ENABLE, velocity=3.0)
-    assert axis.state is State.OPERATION_ENABLED
+    assert axis.state is DriveState.OPERATION_ENABLED
     assert axis.feedback is not None
     assert axis.feedback.velocity == pytest.approx(3.0, rel=0.05)
     assert axis.health.complete >= 45

@@ -16,7 +16,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 
@@ -192,7 +192,7 @@ def test_an_axis_moves_and_reports_si(rig: Rig) -> None:
     drive, bus = rig
     axis = axis_on(bus)
     axis.commission()
-    run_until(lambda: axis.state is State.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)
+    run_until(lambda: axis.state is DriveState.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)
     feedback = axis.feedback
     assert feedback is not None
     assert feedback.velocity == 0.0
@@ -242,7 +242,7 @@ def test_garbage_on_the_bus_ends_nothing(rig: Rig) -> None:
         identifier = noise.choice([0x081, 0x181, 0x281, 0x381, 0x581, 0x701, 0x000, 0x7FF])
         drive.shout(identifier, noise.randbytes(noise.randint(0, 8)))
     run_until(
-        lambda: axis.feedback is not None and axis.feedback.state is State.SWITCH_ON_DISABLED,
+        lambda: axis.feedback is not None and axis.feedback.state is DriveState.SWITCH_ON_DISABLED,
         bus,
         axis,
         RequestedState.DISABLE,
@@ -294,7 +294,7 @@ def test_offsets_that_another_master_left_do_not_move_the_drive(rig: Rig) -> Non
     axis = axis_on(bus)
     axis.commission()
     assert [drive.drive.objects.number(index) for index in (0x60B0, 0x60B1, 0x60B2)] == [0, 0, 0]
-    run_until(lambda: axis.state is State.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)
+    run_until(lambda: axis.state is DriveState.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)
     run_cycles(bus, axis, RequestedState.ENABLE, 20)
     assert drive.shaft.motor_velocity == pytest.approx(0.0, abs=0.01)
 
@@ -308,4 +308,4 @@ def test_a_drive_that_boots_while_it_is_waited_for_can_be_moved(rig: Rig) -> Non
     axis.commission()
     assert axis.heartbeat.boot_ups == 1
     assert not axis.mapping_lost
-    run_until(lambda: axis.state is State.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)
+    run_until(lambda: axis.state is DriveState.OPERATION_ENABLED, bus, axis, RequestedState.ENABLE)

@@ -10,40 +10,40 @@ from hypothesis import strategies as st
 
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.standstill import Standstill
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State, control_word
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState, control_word
+from winchkit.drivers.can.cia402.units import CountScale
 
-SCALE = Scale(angle=1e-3, velocity=0.1, torque=1e-3)
+SCALE = CountScale(angle=1e-3, velocity=0.1, torque=1e-3)
 ENABLING = {
-    State.SWITCH_ON_DISABLED: 0x06,
-    State.READY_TO_SWITCH_ON: 0x07,
-    State.SWITCHED_ON: 0x0F,
-    State.OPERATION_ENABLED: 0x0F,
+    DriveState.SWITCH_ON_DISABLED: 0x06,
+    DriveState.READY_TO_SWITCH_ON: 0x07,
+    DriveState.SWITCHED_ON: 0x0F,
+    DriveState.OPERATION_ENABLED: 0x0F,
 }
 
 
 def word_by_the_rules(
-    state: State, requested: RequestedState, previous: int, age: int, at_rest: bool
+    state: DriveState, requested: RequestedState, previous: int, age: int, at_rest: bool
 ) -> int:
     """The rules of ``control_word`` in the order of its docstring."""
     if requested is RequestedState.ENABLE and state in ENABLING:
         return ENABLING[state]
-    ramp = previous & 0x8F == 0x0F and age <= 5 and state is State.OPERATION_ENABLED
+    ramp = previous & 0x8F == 0x0F and age <= 5 and state is DriveState.OPERATION_ENABLED
     if ramp and requested in (RequestedState.RUN_DOWN, RequestedState.HALT):
         return 0x0F if requested is RequestedState.RUN_DOWN else 0x10F
     if (
         age <= 1
-        and state is State.FAULT
+        and state is DriveState.FAULT
         and requested is RequestedState.RESET
         and not previous & 0x80
     ):
         return 0x80
-    at_end = age <= 1 and at_rest and state is State.QUICK_STOP_ACTIVE
+    at_end = age <= 1 and at_rest and state is DriveState.QUICK_STOP_ACTIVE
     return 0x00 if at_end and requested in (RequestedState.DISABLE, RequestedState.ENABLE) else 0x02
 
 
 @given(
-    state=st.sampled_from(State),
+    state=st.sampled_from(DriveState),
     requested=st.sampled_from(RequestedState),
     previous=st.sampled_from([0x00, 0x02, 0x06, 0x07, 0x0F, 0x10F, 0x80, 0x8F]),
     age=st.integers(0, 7),
@@ -51,7 +51,7 @@ def word_by_the_rules(
 )
 @settings(max_examples=500)
 def test_the_control_word_is_that_of_the_rules(
-    state: State, requested: RequestedState, previous: int, age: int, at_rest: bool
+    state: DriveState, requested: RequestedState, previous: int, age: int, at_rest: bool
 ) -> None:
     found = control_word(state, requested, previous=previous, age=age, at_rest=at_rest)
     assert found == word_by_the_rules(state, requested, previous, age, at_rest)

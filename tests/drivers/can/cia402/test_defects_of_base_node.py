@@ -18,7 +18,7 @@ from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 
@@ -114,7 +114,7 @@ def test_2_a_quick_stop_is_not_followed_by_enabling(
     with rig[0].lock:
         rig[0].drive.objects.put(0x605A, 0, option)
     drive, shaft = rig[0].drive, rig[0].shaft
-    moving = State.OPERATION_ENABLED
+    moving = DriveState.OPERATION_ENABLED
     run_until(
         rig,
         axis,
@@ -132,7 +132,7 @@ def test_3_a_reset_ends_disabled(rig: Rig, axis: Cia402Axis) -> None:
     with rig[0].lock:
         rig[0].drive.inject("over-current")
     drive = rig[0].drive
-    run_until(rig, axis, RequestedState.DISABLE, lambda: axis.state is State.FAULT)
+    run_until(rig, axis, RequestedState.DISABLE, lambda: axis.state is DriveState.FAULT)
     assert drive.state.name == "FAULT"
     seen = run_until(
         rig, axis, RequestedState.RESET, lambda: drive.state.name == "SWITCH_ON_DISABLED"
@@ -184,10 +184,10 @@ def test_5_the_control_word_is_sent_every_cycle(rig: Rig, axis: Cia402Axis) -> N
 def test_6_a_cycle_costs_no_sdo_and_silence_is_not_a_state(rig: Rig, axis: Cia402Axis) -> None:
     drive, bus = rig
     assert axis.feedback is None
-    assert axis.state is State.UNKNOWN
+    assert axis.state is DriveState.UNKNOWN
     before = len(drive.frames)
     assert axis.send(RequestedState.ENABLE) == 0
-    run_until(rig, axis, RequestedState.ENABLE, lambda: axis.state is State.OPERATION_ENABLED)
+    run_until(rig, axis, RequestedState.ENABLE, lambda: axis.state is DriveState.OPERATION_ENABLED)
     assert [i for i, _ in drive.frames[before:] if i == 0x601] == []
     assert bus.fault is None
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hand_made import CYCLE, NODE, RPDO, SCALE, TPDO, HandMade, codec
 from winchkit.drivers.can.cia402.feedback import Gathering, check_feedback
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import FileError
 
 ENABLED, READY, DISABLED = 0x0237, 0x0231, 0x0250
@@ -25,7 +25,7 @@ def test_all_of_an_answer_in_si() -> None:
     assert feedback is not None
     assert (feedback.angle, feedback.velocity) == (12.5, -3.25)
     assert feedback.torque == pytest.approx(0.75)
-    assert (feedback.state, feedback.error_code) == (State.OPERATION_ENABLED, 0x8611)
+    assert (feedback.state, feedback.error_code) == (DriveState.OPERATION_ENABLED, 0x8611)
     assert feedback.limited
     assert feedback.target_reached
 
@@ -146,7 +146,7 @@ def test_no_frames_make_a_drive_enabled_that_does_not_say_so(
         else:
             made.bus.deliver(0x700 + NODE, b"\0" if kind == "boot" else b"\x05")
         feedback, axis = made.axis.feedback, made.axis
-        if axis.state is State.OPERATION_ENABLED:
+        if axis.state is DriveState.OPERATION_ENABLED:
             assert feedback is not None
             assert feedback.status in said
             assert feedback.status & 0x6F == 0x27
@@ -179,10 +179,10 @@ def test_what_a_drive_said_long_ago_is_not_accepted() -> None:
     made = HandMade()
     made.answer(ENABLED)
     made.begin()
-    assert made.axis.state is State.OPERATION_ENABLED
+    assert made.axis.state is DriveState.OPERATION_ENABLED
     for _ in range(math.ceil(0.1 / CYCLE) + 1):
         made.begin()
-    assert made.axis.state is State.UNKNOWN
+    assert made.axis.state is DriveState.UNKNOWN
     assert made.axis.send(RequestedState.ENABLE) == 0x02
 
 
@@ -193,7 +193,7 @@ def test_a_reboot_ends_all_belief_until_it_is_commissioned_again() -> None:
     assert made.axis.mapping_lost
     assert not made.axis.operational
     made.answer(ENABLED)
-    assert made.axis.state is State.UNKNOWN
+    assert made.axis.state is DriveState.UNKNOWN
     assert made.axis.send(RequestedState.ENABLE, velocity=1.0) == 0x02
 
 

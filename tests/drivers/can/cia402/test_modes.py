@@ -12,7 +12,7 @@ from hand_made import RPDO, SCALE, TPDO, HandMade, codec
 from winchkit.drivers.can.cia402.command import SetPoint
 from winchkit.drivers.can.cia402.modes import (
     MODES,
-    Homing,
+    HomingState,
     homing_state,
     mode_named,
     modes_of,
@@ -64,18 +64,18 @@ def test_bits_mean_what_the_mode_says() -> None:
 @pytest.mark.parametrize(
     ("bits", "state"),
     [
-        (0x0000, Homing.RUNNING),
-        (0x0400, Homing.INTERRUPTED),
-        (0x1000, Homing.ATTAINED),
-        (0x1400, Homing.DONE),
-        (0x2000, Homing.FAILED_MOVING),
-        (0x2400, Homing.FAILED),
-        (0x3400, Homing.FAILED),
+        (0x0000, HomingState.RUNNING),
+        (0x0400, HomingState.INTERRUPTED),
+        (0x1000, HomingState.ATTAINED),
+        (0x1400, HomingState.DONE),
+        (0x2000, HomingState.FAILED_MOVING),
+        (0x2400, HomingState.FAILED),
+        (0x3400, HomingState.FAILED),
     ],
 )
-def test_homing_by_bits_13_12_and_10(bits: int, state: Homing) -> None:
+def test_homing_by_bits_13_12_and_10(bits: int, state: HomingState) -> None:
     assert homing_state(ENABLED | bits) is state
-    assert state.over == (state in (Homing.DONE, Homing.FAILED))
+    assert state.over == (state in (HomingState.DONE, HomingState.FAILED))
 
 
 def words_and_targets(frames: dict[int, bytes]) -> tuple[int, int, int]:
@@ -151,7 +151,7 @@ def test_homing_starts_by_bit_4_on_command() -> None:
         made.answer(ENABLED, mode=6)
         assert made.axis.send(RequestedState.ENABLE, start=start) == word
     made.answer(ENABLED | 0x1400, mode=6)
-    assert made.axis.homing is Homing.DONE
+    assert made.axis.homing is HomingState.DONE
     made.answer(0x0233, mode=6)
     assert made.axis.send(RequestedState.ENABLE, start=True) == 0x0F
 

@@ -15,9 +15,9 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.limits import LimitsAtShaft
-from winchkit.drivers.can.cia402.modes import Homing
+from winchkit.drivers.can.cia402.modes import HomingState
 from winchkit.drivers.can.cia402.profile_parameters import HomingSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.device import DeviceSpec
@@ -79,11 +79,11 @@ class Rig:
         raise AssertionError(f"it did not come to that; the drive is {self.axis.state}")
 
     def enable(self) -> None:
-        self.until(lambda: self.axis.state is State.OPERATION_ENABLED, RequestedState.ENABLE)
+        self.until(lambda: self.axis.state is DriveState.OPERATION_ENABLED, RequestedState.ENABLE)
 
     def disable(self) -> None:
         self.until(
-            lambda: self.axis.state is State.SWITCH_ON_DISABLED and self.axis.at_rest,
+            lambda: self.axis.state is DriveState.SWITCH_ON_DISABLED and self.axis.at_rest,
             RequestedState.DISABLE,
         )
 
@@ -130,7 +130,7 @@ def test_profile_velocity_ramps_by_itself(rig_in: Callable[..., Rig]) -> None:
         lambda: "target reached" in rig.axis.status_words, RequestedState.ENABLE, velocity=5.0
     )
     rig.until(lambda: rig.axis.at_rest, RequestedState.RUN_DOWN)
-    assert rig.axis.state is State.OPERATION_ENABLED
+    assert rig.axis.state is DriveState.OPERATION_ENABLED
 
 
 def test_profile_position_makes_one_move_for_each_target(rig_in: Callable[..., Rig]) -> None:
@@ -159,7 +159,7 @@ def test_a_profile_position_move_is_halted_by_running_down(rig_in: Callable[...,
     rig.enable()
     rig.until(lambda: rig.speed > 5.0, RequestedState.ENABLE, angle=1000.0)
     rig.until(lambda: abs(rig.speed) < 0.05, RequestedState.RUN_DOWN)
-    assert rig.axis.state is State.OPERATION_ENABLED
+    assert rig.axis.state is DriveState.OPERATION_ENABLED
     rig.disable()
 
 
@@ -187,7 +187,7 @@ def test_homing_here_sets_the_zero(rig_in: Callable[..., Rig], method: int) -> N
     rig.axis.prepare_homing(HomingSpec(method, 5.0, 1.0, 50.0))
     rig.enable()
     rig.run(RequestedState.ENABLE, 10, start=True)
-    rig.until(lambda: rig.axis.homing is Homing.DONE, RequestedState.ENABLE, start=True)
+    rig.until(lambda: rig.axis.homing is HomingState.DONE, RequestedState.ENABLE, start=True)
     rig.run(RequestedState.DISABLE, 3)
     rig.disable()
     rig.axis.switch_mode("CSV")
@@ -216,7 +216,7 @@ def test_halt_stays_enabled_whatever_605d_says(rig_in: Callable[..., Rig], code:
     rig.run(RequestedState.ENABLE, 25, velocity=5.0)
     rig.until(lambda: abs(rig.speed) < 0.05, RequestedState.HALT)
     rig.run(RequestedState.HALT, 5)
-    assert rig.axis.state is State.OPERATION_ENABLED
+    assert rig.axis.state is DriveState.OPERATION_ENABLED
     rig.until(lambda: rig.speed > 4.0, RequestedState.ENABLE, velocity=5.0)
 
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hand_made import Objects
-from winchkit.drivers.can.cia402.units import Scale, Units, read_scale, scale_of
+from winchkit.drivers.can.cia402.units import CountScale, UnitObjects, read_scale, scale_of
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
@@ -69,7 +69,7 @@ def test_an_encoder_behind_a_gear_without_a_feed_constant() -> None:
     ],
 )
 def test_positions_in_a_rotary_si_unit(position: int, degrees: float) -> None:
-    scale = scale_of(Units(encoder=4096, position=position), SERVO)
+    scale = scale_of(UnitObjects(encoder=4096, position=position), SERVO)
     assert scale.angle == pytest.approx(math.radians(degrees))
 
 
@@ -83,17 +83,19 @@ def test_positions_in_a_rotary_si_unit(position: int, degrees: float) -> None:
     ],
 )
 def test_speeds_in_an_si_unit_count_before_the_file(unit: int, velocity: float) -> None:
-    assert scale_of(Units(velocity=unit), SERVO).velocity == pytest.approx(velocity)
+    assert scale_of(UnitObjects(velocity=unit), SERVO).velocity == pytest.approx(velocity)
 
 
 def test_an_si_unit_at_the_shaft_counts_through_the_gear() -> None:
     """1 rpm of a shaft behind 5:1 is 5 rpm of the motor."""
-    assert scale_of(Units(gear=5.0, velocity=0x00B44700), SERVO).velocity == pytest.approx(5 * RPM)
+    assert scale_of(UnitObjects(gear=5.0, velocity=0x00B44700), SERVO).velocity == pytest.approx(
+        5 * RPM
+    )
 
 
 def test_a_linear_unit_reports_nothing_and_the_file_counts() -> None:
-    units = Units(position=0xFD010000, velocity=0xFD010300, rated_current=1.0)
-    assert scale_of(units, SERVO) == scale_of(Units(rated_current=1.0), SERVO)
+    units = UnitObjects(position=0xFD010000, velocity=0xFD010300, rated_current=1.0)
+    assert scale_of(units, SERVO) == scale_of(UnitObjects(rated_current=1.0), SERVO)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +103,7 @@ def test_a_linear_unit_reports_nothing_and_the_file_counts() -> None:
 )
 def test_speed_units_of_a_device_file(unit: str, velocity: float) -> None:
     servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, speed_unit=unit)
-    assert scale_of(Units(), servo).velocity == pytest.approx(velocity)
+    assert scale_of(UnitObjects(), servo).velocity == pytest.approx(velocity)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +124,7 @@ def test_speed_units_of_a_device_file(unit: str, velocity: float) -> None:
 def test_a_speed_unit_is_any_product(unit: str, counts: float) -> None:
     """The number that a drive of 10 000 increments a turn shows at 10 rpm, worked by hand."""
     servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, speed_unit=unit)
-    assert 10 * RPM / scale_of(Units(), servo).velocity == pytest.approx(counts, rel=1e-6)
+    assert 10 * RPM / scale_of(UnitObjects(), servo).velocity == pytest.approx(counts, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +141,7 @@ def test_a_position_unit_is_any_product(unit: str, counts: float) -> None:
     servo = ServoSpec(
         *("x.eds", ("CSV",)), increments_per_turn=10_000, units="file", position_unit=unit
     )
-    scale = scale_of(Units(encoder=7.0, feed=3.0), servo)
+    scale = scale_of(UnitObjects(encoder=7.0, feed=3.0), servo)
     assert 2 * math.pi / scale.angle == pytest.approx(counts)
     assert scale.velocity == pytest.approx(scale.angle), "increments are units of 6064h"
 
@@ -148,17 +150,17 @@ def test_the_encoder_of_a_speed_unit_is_the_drives_where_it_says_it() -> None:
     servo = ServoSpec(
         *("x.eds", ("CSV",)), increments_per_turn=10_000, speed_unit="1875 rpm / 512 / encoder"
     )
-    found = scale_of(Units(encoder=4096.0), servo).velocity
+    found = scale_of(UnitObjects(encoder=4096.0), servo).velocity
     assert found == pytest.approx(1875 * RPM / 512 / 4096)
 
 
 def test_objects_that_stand_at_one_are_refused_and_the_file_can_overrule_them() -> None:
     """Some drives show 1/1 everywhere and count encoder increments all the same."""
-    units = Units(encoder=1.0, gear=1.0, feed=1.0, velocity=0x00B44700, rated_current=1.0)
+    units = UnitObjects(encoder=1.0, gear=1.0, feed=1.0, velocity=0x00B44700, rated_current=1.0)
     with pytest.raises(NotPermitted, match=r'too few to move by.*servo.units = "file"'):
         scale_of(units, SERVO)
     servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, units="file")
-    assert scale_of(units, servo) == scale_of(Units(rated_current=1.0), servo)
+    assert scale_of(units, servo) == scale_of(UnitObjects(rated_current=1.0), servo)
 
 
 def test_the_refusal_names_the_drive() -> None:
@@ -171,7 +173,7 @@ def test_the_refusal_names_the_drive() -> None:
     count=st.integers(-(2**31) + 1, 2**31 - 1),
 )
 def test_counts_are_the_nearest_and_never_wrap(unit: float, count: int) -> None:
-    scale = Scale(unit, unit, unit)
+    scale = CountScale(unit, unit, unit)
     assert scale.angle_counts(count * unit) == pytest.approx(count, abs=1e-6 * abs(count) + 1)
     for beyond in (2.0**31 * unit * 1.001, -(2.0**31) * unit * 1.001, math.inf, math.nan):
         with pytest.raises(NotPermitted, match="beyond the drive's range"):

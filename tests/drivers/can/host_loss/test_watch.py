@@ -13,7 +13,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import RequestedState, State
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import NotPermitted
 
@@ -147,7 +147,7 @@ def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Rig) -> None:
     axis = axis_on(bus)
     axis.commission()
     for number in range(1500):
-        if axis.state is State.OPERATION_ENABLED:
+        if axis.state is DriveState.OPERATION_ENABLED:
             break
         axis.begin_cycle(number, CLOCK.now())
         bus.sync()
@@ -157,4 +157,4 @@ def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Rig) -> None:
             bus.heartbeat(HOST, 5)
         time.sleep(0.006)
         axis.send(RequestedState.ENABLE)
-    assert axis.state is State.OPERATION_ENABLED
+    assert axis.state is DriveState.OPERATION_ENABLED

@@ -12,7 +12,7 @@ from canopen.objectdictionary import ODRecord
 from makers_rig import Host, axis_on, generic, opened
 from slave import Nmt, State
 from winchkit.drivers.can.cia402.commission import set_communication
-from winchkit.drivers.can.tools.scan import Found, scan
+from winchkit.drivers.can.tools.scan import ScannedNode, scan
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BusSpec
@@ -21,7 +21,7 @@ SPEC = BusSpec("can", interface="virtual", channel="x")
 pytestmark = pytest.mark.realtime
 
 
-def scanned(bus: object) -> dict[int, Found]:
+def scanned(bus: object) -> dict[int, ScannedNode]:
     return {item.node: item for item in scan(bus, SPEC, MonotonicClock(), 0.3)}  # type: ignore[arg-type]
 
 

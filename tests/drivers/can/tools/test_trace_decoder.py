@@ -12,7 +12,7 @@ import pytest
 
 from winchkit import catalog
 from winchkit.can_trace import TraceFrame
-from winchkit.drivers.can.tools.decode import Decoded
+from winchkit.drivers.can.tools.decode import DecodedFrame
 from winchkit.drivers.can.tools.trace_decoder import (
     Description,
     TraceDecoder,
@@ -28,7 +28,7 @@ def by_eds() -> TraceDecoder:
     return TraceDecoder(read_description(str(EDS)))
 
 
-def said(decoder: TraceDecoder, identifier: int, data: str) -> Decoded:
+def said(decoder: TraceDecoder, identifier: int, data: str) -> DecodedFrame:
     return decoder.decode(TraceFrame(1, 0.0, identifier, bytes.fromhex(data)))
 
 
@@ -146,7 +146,7 @@ def test_a_pdo_of_another_length_has_no_values_and_a_note() -> None:
 @pytest.mark.parametrize("identifier", [0x002, 0x07F, 0x200, 0x580, 0x7EA, 0x8002])
 def test_an_identifier_of_no_service_is_of_no_node(identifier: int) -> None:
     """CiA 301: the predefined connection set begins with node 1."""
-    assert said(by_eds(), identifier, "40 01") == Decoded("other", 0, "40 01")
+    assert said(by_eds(), identifier, "40 01") == DecodedFrame("other", 0, "40 01")
 
 
 def test_a_description_of_another_device_is_reported() -> None:

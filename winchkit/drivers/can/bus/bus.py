@@ -22,7 +22,7 @@ from winchkit.drivers.can.bus.interface import (
     sends_remote,
     simulated_interface,
 )
-from winchkit.drivers.can.bus.socketcan import Frame
+from winchkit.drivers.can.bus.socketcan import ReceivedFrame
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import ConnectionLost
@@ -398,7 +398,7 @@ class CanBus:
             if not self._dispatch(frames, now):
                 return
 
-    def _dispatch(self, frames: Sequence[Frame], now: float) -> bool:
+    def _dispatch(self, frames: Sequence[ReceivedFrame], now: float) -> bool:
         """Hand frames to their handlers; False where one has raised, which is a defect."""
         handler_of, stamp_to_clock = self._handlers.get, self._times.map
         for identifier, data, stamp, error in frames:

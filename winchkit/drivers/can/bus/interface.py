@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import can
 
 from winchkit.drivers.can.bus.health import BusState
-from winchkit.drivers.can.bus.socketcan import Frame, SocketCan
+from winchkit.drivers.can.bus.socketcan import ReceivedFrame, SocketCan
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler
 from winchkit.errors import ConnectionLost
@@ -67,7 +67,7 @@ class Interface(Protocol):
     dropped: int
     """Frames that its queue had no room for."""
 
-    def receive(self, timeout: float) -> Sequence[Frame]:
+    def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         """Take the frames that wait, at least one within ``timeout`` (s); empty if there is none.
 
         A confirmation of what was sent here, where the interface marks it as one, is no frame.
@@ -99,7 +99,7 @@ class _Library:
         self._stamped = stamped
         self._tells = type(bus).state is not can.BusABC.state
 
-    def receive(self, timeout: float) -> Sequence[Frame]:
+    def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         message = self.library.recv(timeout)
         if message is None or message.is_remote_frame or not message.is_rx:
             return ()
@@ -107,7 +107,7 @@ class _Library:
             return ()
         stamp = message.timestamp if self._stamped else 0.0
         data = bytes(message.data)
-        return (Frame(message.arbitration_id, data, stamp, message.is_error_frame),)
+        return (ReceivedFrame(message.arbitration_id, data, stamp, message.is_error_frame),)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.library.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
@@ -135,9 +135,9 @@ class _Multicast:
         self._port = port
         self.send, self.close = port.send, port.close
 
-    def receive(self, timeout: float) -> Sequence[Frame]:
+    def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         received = self._port.receive(timeout)
-        return () if received is None else (Frame(*received),)
+        return () if received is None else (ReceivedFrame(*received),)
 
     def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
         return 0
@@ -166,9 +166,9 @@ class _Simulated:
         self.library = port
         self.dropped = 0
 
-    def receive(self, timeout: float) -> Sequence[Frame]:
+    def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         received = self.library.receive(timeout)
-        return () if received is None else (Frame(*received),)
+        return () if received is None else (ReceivedFrame(*received),)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.library.transmit(identifier, data)

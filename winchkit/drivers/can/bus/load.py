@@ -33,7 +33,7 @@ class FrameKind:
 
 
 @dataclass(frozen=True)
-class Load:
+class BusLoad:
     """Traffic of a bus."""
 
     bitrate: int
@@ -86,10 +86,10 @@ def load_of(
     cycle: float,
     frames: Iterable[FrameKind],
     heartbeats: Mapping[str, float] | None = None,
-) -> Load:
+) -> BusLoad:
     """Load of frames with SYNC and heartbeats added; those are periods (s) by who sends them."""
     beats = (
         FrameKind(f"{who} heartbeat", 1, period=period)
         for who, period in (heartbeats or {}).items()
     )
-    return Load(bitrate, cycle, (FrameKind("SYNC", 0, every=1), *frames, *beats))
+    return BusLoad(bitrate, cycle, (FrameKind("SYNC", 0, every=1), *frames, *beats))

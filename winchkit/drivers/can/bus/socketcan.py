@@ -52,7 +52,7 @@ _QUEUE = 1 << 20
 _new = tuple.__new__
 
 
-class Frame(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """A frame as received: of 11 bits and with data, or an error frame.
 
     A named tuple, since thousands of them are made a second.
@@ -83,7 +83,7 @@ class SocketCan:
         self._recvmmsg.argtypes = [number, address, ctypes.c_uint, number, address]
         self._sendmmsg.argtypes = [number, address, ctypes.c_uint, number]
 
-    def receive(self, timeout: float) -> Sequence[Frame]:
+    def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         """Take all frames that wait, or the first within ``timeout`` (s)."""
         if timeout != self._timeout:
             self._set_timeout(timeout)
@@ -156,21 +156,21 @@ class _Messages:
         """Make them ready to receive."""
         self._headers[:] = self._empty
 
-    def taken(self, count: int) -> tuple[list[Frame], int | None]:
+    def taken(self, count: int) -> tuple[list[ReceivedFrame], int | None]:
         """Frames of the first ``count``, which were received, and the newest count of drops."""
-        taken: list[Frame] = []
+        taken: list[ReceivedFrame] = []
         dropped, at, place = None, 0, 0
         outcomes = _OUTCOME.iter_unpack(self._headers[: count * _MESSAGE.size])
         contents = _FRAME.iter_unpack(self._frames[: count * _FRAME.size])
         for (used, flags, size), (word, length, payload) in zip(outcomes, contents, strict=True):
-            frame: Frame | None
+            frame: ReceivedFrame | None
             drops = None
             if size == _SIZE and word < _ERROR:
                 stamp = 0.0
                 if used:
                     stamp, drops = self._told(place, used)
                 # What Frame(...) makes, without the call of its constructor.
-                frame = _new(Frame, (word, payload[:length], stamp, False))
+                frame = _new(ReceivedFrame, (word, payload[:length], stamp, False))
             else:
                 control = self._control[place : place + used]
                 frame, drops = parse_socketcan(self._frames[at : at + size], control)
@@ -206,7 +206,7 @@ def _memory(size: int) -> tuple[bytearray, int]:
 
 def parse_socketcan(
     data: bytes | bytearray, control: bytes | bytearray
-) -> tuple[Frame | None, int | None]:
+) -> tuple[ReceivedFrame | None, int | None]:
     """A ``struct can_frame`` with its control messages: the frame, and the count of drops.
 
     None in place of a frame of 29 bits, a remote frame or a fragment; None in place of a count
@@ -219,7 +219,7 @@ def parse_socketcan(
     error = bool(identifier & _ERROR)
     if not error and identifier & (_EXTENDED | _REMOTE):
         return None, drops
-    return Frame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
+    return ReceivedFrame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
 
 
 def _told(control: bytes | bytearray, at: int, last: int) -> tuple[float, int | None]:

@@ -78,7 +78,7 @@ class OptionEntry:
 
 
 @dataclass(frozen=True)
-class HostLoss:
+class HostLossObjects:
     """A mechanism by which a drive detects a lost host, by the objects of its EDS."""
 
     way: str
@@ -111,7 +111,7 @@ class DriveDescription:
     """Targets and control word: whether an RPDO can carry them."""
     receive: tuple[PdoEntry, ...]
     transmit: tuple[PdoEntry, ...]
-    host_loss: tuple[HostLoss, ...]
+    host_loss: tuple[HostLossObjects, ...]
     options: tuple[OptionEntry, ...]
     obstacles: tuple[str, ...]
     """Why winchkit cannot move it; none where it can."""
@@ -177,17 +177,17 @@ def _values(dictionary: Any) -> Iterator[str]:
                 yield object_name(index, sub)
 
 
-def host_loss_ways(dictionary: Any) -> tuple[HostLoss, ...]:
+def host_loss_ways(dictionary: Any) -> tuple[HostLossObjects, ...]:
     """Mechanisms by which the drive may detect a lost host, best first; each needs its proof."""
     return tuple(_host_loss(dictionary))
 
 
-def _host_loss(dictionary: Any) -> Iterator[HostLoss]:
+def _host_loss(dictionary: Any) -> Iterator[HostLossObjects]:
     reaction, by = _reaction(dictionary)
     if writable(dictionary, 0x1016, 1):
-        yield HostLoss("heartbeat", ("1016h", *by), reaction)
+        yield HostLossObjects("heartbeat", ("1016h", *by), reaction)
     if writable(dictionary, 0x100C) and writable(dictionary, 0x100D):
-        yield HostLoss("guarding", ("100Ch", "100Dh", *by), reaction)
+        yield HostLossObjects("guarding", ("100Ch", "100Dh", *by), reaction)
     timers = [
         entry.number
         for entry in _pdos(dictionary, _RPDO)
@@ -195,10 +195,12 @@ def _host_loss(dictionary: Any) -> Iterator[HostLoss]:
     ]
     if timers:
         records = tuple(f"{_RPDO + number - 1:04X}h:5" for number in timers[:1])
-        yield HostLoss("rpdo-timeout", records, "EMCY 8250h; what else it does is to be proved")
+        yield HostLossObjects(
+            "rpdo-timeout", records, "EMCY 8250h; what else it does is to be proved"
+        )
     cyclic = any(MODES[mode].cyclic for mode in _modes(dictionary))
     if cyclic and writable(dictionary, 0x1006):
-        yield HostLoss("sync-loss", ("1006h",), "what it does is to be proved")
+        yield HostLossObjects("sync-loss", ("1006h",), "what it does is to be proved")
 
 
 def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
@@ -284,7 +286,7 @@ def _obstacles(
     motion: dict[str, str],
     receive: tuple[PdoEntry, ...],
     transmit: tuple[PdoEntry, ...],
-    ways: tuple[HostLoss, ...],
+    ways: tuple[HostLossObjects, ...],
 ) -> Iterator[str]:
     if not _is_drive(dictionary):
         profile = _profile(dictionary)

@@ -18,7 +18,7 @@ from winchkit.drivers.can.canopen.declared import (
 from winchkit.drivers.can.canopen.description import (
     ALWAYS,
     PDO_BITS,
-    HostLoss,
+    HostLossObjects,
     host_loss_ways,
     lacking,
 )
@@ -54,7 +54,7 @@ class EdsReport:
 
     faults: tuple[Fault, ...]
     warnings: tuple[Fault, ...]
-    host_loss: tuple[HostLoss, ...] = ()
+    host_loss: tuple[HostLossObjects, ...] = ()
     """Ways to notice a dead host that the EDS has."""
 
 
@@ -154,7 +154,7 @@ def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
     return ""
 
 
-def host_loss_problem(ways: tuple[HostLoss, ...], way: str) -> str:
+def host_loss_problem(ways: tuple[HostLossObjects, ...], way: str) -> str:
     """Why a drive cannot notice a dead host in a declared way; empty where its EDS allows it.
 
     A maker's own way (``vendor:``) and hardware that stops the drive are not in an EDS.

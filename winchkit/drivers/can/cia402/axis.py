@@ -11,7 +11,7 @@ from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
-from winchkit.drivers.can.cia402.command import Command, Commander
+from winchkit.drivers.can.cia402.command import Commander, CycleCommand
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.cia402.feedback import (
     AxisFeedback,
@@ -21,8 +21,8 @@ from winchkit.drivers.can.cia402.feedback import (
 )
 from winchkit.drivers.can.cia402.modes import (
     MODES,
-    Homing,
-    Target,
+    HomingState,
+    TargetKind,
     change_mode,
     homing_state,
     require_mode,
@@ -39,8 +39,8 @@ from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.second_master import SecondMaster
 from winchkit.drivers.can.cia402.state_machine import (
     QUICK_STOP,
+    DriveState,
     RequestedState,
-    State,
     control_word,
 )
 from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
@@ -59,7 +59,11 @@ _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
 _RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)
 _OPERATIONAL = int(NmtState.OPERATIONAL)
-_POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
+_POWERED = (
+    DriveState.OPERATION_ENABLED,
+    DriveState.QUICK_STOP_ACTIVE,
+    DriveState.FAULT_REACTION_ACTIVE,
+)
 
 
 class Cia402Axis:
@@ -187,7 +191,7 @@ class Cia402Axis:
         self._sdo_stop.end()
 
     @property
-    def sdo_state(self) -> State | None:
+    def sdo_state(self) -> DriveState | None:
         """Power state read by SDO since the stop by SDO began."""
         return self._sdo_stop.state
 
@@ -342,7 +346,7 @@ class Cia402Axis:
         self._mode = mode = MODES[name]
         self.moves_alone = mode.moves_alone
         """Whether it makes the motion of its mode by itself (HM, PP)."""
-        self.position_mode = mode.kind is Target.ANGLE
+        self.position_mode = mode.kind is TargetKind.ANGLE
         """Whether it is moved by target positions (CSP, IP) and not by speeds."""
 
     @property
@@ -368,27 +372,29 @@ class Cia402Axis:
     @property
     def lost_set_up(self) -> bool:
         """Whether it has to be commissioned again: it booted, or does not run its PDOs."""
-        return self.mapping_lost or not self.operational or self.state is State.UNKNOWN
+        return self.mapping_lost or not self.operational or self.state is DriveState.UNKNOWN
 
     @property
-    def state(self) -> State:
+    def state(self) -> DriveState:
         """Power state by the newest feedback; UNKNOWN once that is stale."""
         return self._certain(self.feedback)
 
-    def _certain(self, feedback: AxisFeedback | None) -> State:
+    def _certain(self, feedback: AxisFeedback | None) -> DriveState:
         """The state that a feedback, the newest, shows."""
         if feedback is None or self.mapping_lost:
-            return State.UNKNOWN
+            return DriveState.UNKNOWN
         sync, now = self._cycle
         old = sync - feedback.sync > _STALE_SYNCS
         if old and now - feedback.time > _STALE_BEATS * self._watch.heartbeat:
-            return State.UNKNOWN
+            return DriveState.UNKNOWN
         return feedback.state
 
     @property
-    def homing(self) -> Homing:
+    def homing(self) -> HomingState:
         """State of the homing by the newest feedback; for the mode HM, once it was started."""
-        return Homing.INTERRUPTED if self.feedback is None else homing_state(self.feedback.status)
+        return (
+            HomingState.INTERRUPTED if self.feedback is None else homing_state(self.feedback.status)
+        )
 
     @property
     def status_words(self) -> tuple[str, ...]:
@@ -450,7 +456,7 @@ class Cia402Axis:
             at_rest=self._position.at_rest(feedback),
         )
         # What Command(...) makes, without the call of its constructor.
-        command = _new(Command, (requested, velocity, angle, torque, start))
+        command = _new(CycleCommand, (requested, velocity, angle, torque, start))
         word, frames = commander.frames(word, command, feedback)
         if not self.host.silent or not self.host.withholds_rpdos:
             for identifier, data in frames:

@@ -10,21 +10,21 @@ from typing import NamedTuple
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
-from winchkit.drivers.can.cia402.modes import AT_ONCE, MODES, START, TARGETS, Target
+from winchkit.drivers.can.cia402.modes import AT_ONCE, MODES, START, TARGETS, TargetKind
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.state_machine import (
     ENABLE_OPERATION,
     HALT,
     QUICK_STOP,
+    DriveState,
     RequestedState,
-    State,
 )
 from winchkit.errors import Fault, FileError, NotPermitted
 
 _ACKNOWLEDGED = 1 << 12
 
 
-class _Step(Enum):
+class _Handshake(Enum):
     IDLE = 0
     PLACED = 1
     RAISED = 2
@@ -39,22 +39,22 @@ class SetPoint:
 
     def __init__(self) -> None:
         self._offered = 0
-        self._step = _Step.IDLE
+        self._step = _Handshake.IDLE
 
     def reset(self, actual: int) -> None:
         """The axis is not enabled: it holds its place until a target differs from it."""
-        self._offered, self._step = actual, _Step.IDLE
+        self._offered, self._step = actual, _Handshake.IDLE
 
     def step(self, target: int | None, status: int) -> tuple[int, int]:
         """Bits for the control word and the target to send (counts); None asks for no move."""
         acknowledged = bool(status & _ACKNOWLEDGED)
-        if self._step is _Step.PLACED:
-            self._step = _Step.RAISED
-        elif self._step is _Step.RAISED:
-            self._step = _Step.IDLE if acknowledged else _Step.RAISED
+        if self._step is _Handshake.PLACED:
+            self._step = _Handshake.RAISED
+        elif self._step is _Handshake.RAISED:
+            self._step = _Handshake.IDLE if acknowledged else _Handshake.RAISED
         elif target is not None and target != self._offered and not acknowledged:
-            self._offered, self._step = target, _Step.PLACED
-        return (START | AT_ONCE if self._step is _Step.RAISED else 0), self._offered
+            self._offered, self._step = target, _Handshake.PLACED
+        return (START | AT_ONCE if self._step is _Handshake.RAISED else 0), self._offered
 
 
 Key = tuple[int, int]
@@ -62,11 +62,11 @@ Key = tuple[int, int]
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B1, 0), (0x60B2, 0)
 _ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
-_ENABLED, _RUN_DOWN = State.OPERATION_ENABLED, RequestedState.RUN_DOWN
+_ENABLED, _RUN_DOWN = DriveState.OPERATION_ENABLED, RequestedState.RUN_DOWN
 _MOVES = (RequestedState.ENABLE, _RUN_DOWN)
 
 
-class Command(NamedTuple):
+class CycleCommand(NamedTuple):
     """Requested state and targets of one cycle; SI at the motor shaft."""
 
     requested: RequestedState
@@ -94,7 +94,7 @@ class Commander:
         """Raise FileError where the device file maps too little, or an object without a source."""
         self._name, self._drive, self._mode = name, drive, MODES[mode]
         self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
-        self._by_angle = self._mode.kind is Target.ANGLE
+        self._by_angle = self._mode.kind is TargetKind.ANGLE
         self._homes = mode == "HM"
         self._set_point = SetPoint() if mode == "PP" else None
         target = self._mode.target
@@ -119,11 +119,11 @@ class Commander:
         kind, feeds = self._mode.kind, (_VELOCITY_OFFSET,)
         self._controls = self._places(_CONTROL)
         self._angles = self._places((0x607A, 0), (0x60C1, 1))
-        self._speeds = self._places((0x60FF, 0), *(feeds if kind is Target.ANGLE else ()))
-        self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
+        self._speeds = self._places((0x60FF, 0), *(feeds if kind is TargetKind.ANGLE else ()))
+        self._torques = self._places((0x6071, 0) if kind is TargetKind.TORQUE else _TORQUE_OFFSET)
 
     def frames(
-        self, word: int, command: Command, feedback: AxisFeedback
+        self, word: int, command: CycleCommand, feedback: AxisFeedback
     ) -> tuple[int, list[tuple[int, bytes]]]:
         """The control word with the bits of the mode, and the frames to send.
 

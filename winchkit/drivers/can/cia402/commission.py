@@ -14,8 +14,8 @@ from winchkit.drivers.can.cia402.modes import MODES, change_mode, supported_mode
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
 from winchkit.drivers.can.cia402.profile_parameters import keeps_zero, set_profile, set_quick_stop
 from winchkit.drivers.can.cia402.standstill import PolledStandstill
-from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
-from winchkit.drivers.can.cia402.units import Scale, read_scale
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, DriveState, state_of
+from winchkit.drivers.can.cia402.units import CountScale, read_scale
 from winchkit.drivers.can.host_loss.proof import HostLoss, Proof
 from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.clock import Clock
@@ -198,7 +198,7 @@ class Commissioned:
     mode: str
     modes: tuple[str, ...]
     """All that it has."""
-    scale: Scale
+    scale: CountScale
     tpdo: tuple[PdoCodec, ...]
     rpdo: tuple[PdoCodec, ...]
     options: Mapping[str, OptionCode]
@@ -266,7 +266,7 @@ def commission(
 
 
 def _set_quick_stop(
-    node: SdoNode, servo: ServoSpec, scale: Scale, watch: WatchSpec
+    node: SdoNode, servo: ServoSpec, scale: CountScale, watch: WatchSpec
 ) -> tuple[str, ...]:
     """Write 6085h and read it back; a note where a drive keeps an undeclared ramp."""
     if not watch.quick_stop:
@@ -325,11 +325,11 @@ def _bring_to_rest(node: SdoNode, servo: ServoSpec, clock: Clock) -> None:
     standstill: PolledStandstill | None = None
     while True:
         state = state_of(node.read(0x6041))
-        if state not in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+        if state not in (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE):
             return
         node.write(0x6040, 0, QUICK_STOP)
         standstill = standstill or PolledStandstill(node, servo, clock)
-        if standstill.poll() and state is State.QUICK_STOP_ACTIVE:
+        if standstill.poll() and state is DriveState.QUICK_STOP_ACTIVE:
             return
         if clock.now() > deadline:
             raise NotPermitted(

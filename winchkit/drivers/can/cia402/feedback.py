@@ -12,8 +12,8 @@ from winchkit.drivers.can.bus.bus import Handler
 from winchkit.drivers.can.canopen.pdo import PdoCodec, joint_layout
 from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
-from winchkit.drivers.can.cia402.state_machine import STATE_BITS, STATES, State, StatusBit
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.state_machine import STATE_BITS, STATES, DriveState, StatusBit
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.errors import Fault, FileError
 
 Key = tuple[int, int]
@@ -44,7 +44,7 @@ class AxisFeedback(NamedTuple):
     between its sending and the arrival of the first answer."""
     sync: int
     """Number of that SYNC."""
-    state: State
+    state: DriveState
     status: int
     angle: float
     """rad."""
@@ -101,7 +101,7 @@ class Gathering:
     def __init__(
         self,
         codecs: Sequence[PdoCodec],
-        scale: Scale,
+        scale: CountScale,
         cycle: float,
         counter: PositionCounter | None = None,
         agreement: PositionAgreement | None = None,

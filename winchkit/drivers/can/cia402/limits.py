@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isfinite, nan
 
 from winchkit.drivers.can.canopen.node import SdoNode
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.errors import NotPermitted
 
 _U32_OFF = 0xFFFFFFFF
@@ -50,7 +50,7 @@ class DriveLimits:
     speed: float = nan
 
 
-def set_limits(node: SdoNode, scale: Scale, wanted: LimitsAtShaft) -> DriveLimits:
+def set_limits(node: SdoNode, scale: CountScale, wanted: LimitsAtShaft) -> DriveLimits:
     """Write the limits that are given and read all of them back.
 
     Raises NotPermitted for a limit that the drive has no object for, DeviceRefused for one that
@@ -65,7 +65,7 @@ def set_limits(node: SdoNode, scale: Scale, wanted: LimitsAtShaft) -> DriveLimit
     return read_limits(node, scale)
 
 
-def read_limits(node: SdoNode, scale: Scale) -> DriveLimits:
+def read_limits(node: SdoNode, scale: CountScale) -> DriveLimits:
     """The limits as the drive has them; raises NoReply, DeviceRefused."""
 
     def value(index: int, sub: int, unit: float, none: int | None = None) -> float:
@@ -84,7 +84,7 @@ def read_limits(node: SdoNode, scale: Scale) -> DriveLimits:
     )
 
 
-def _counts(scale: Scale, wanted: LimitsAtShaft) -> Iterator[tuple[int, int, int]]:
+def _counts(scale: CountScale, wanted: LimitsAtShaft) -> Iterator[tuple[int, int, int]]:
     """Index, sub-index and counts of everything that is to be written."""
     if wanted.angle is not None:
         low, high = sorted(wanted.angle)

@@ -25,7 +25,7 @@ _REACHED, _LIMIT = StatusBit.TARGET_REACHED, StatusBit.INTERNAL_LIMIT
 _BIT_12, _BIT_13 = 1 << 12, 1 << 13
 
 
-class Target(Enum):
+class TargetKind(Enum):
     """What kind of target a mode follows."""
 
     ANGLE = "angle"
@@ -43,7 +43,7 @@ class OperationMode:
     """Of 6060h and 6061h."""
     bit: int
     """Of 6502h."""
-    kind: Target
+    kind: TargetKind
     target: Key | None
     """The object that its target is written to."""
     cyclic: bool
@@ -59,11 +59,11 @@ class OperationMode:
     @cached_property
     def can_run_down(self) -> bool:
         """Whether it can be ramped to rest while it stays enabled; no torque holds a load."""
-        return self.kind is not Target.TORQUE
+        return self.kind is not TargetKind.TORQUE
 
 
 def _row(
-    name: str, number: int, kind: Target, target: Key | None, *bits: str, cyclic: bool = False
+    name: str, number: int, kind: TargetKind, target: Key | None, *bits: str, cyclic: bool = False
 ) -> OperationMode:
     masks = (_REACHED, _BIT_12, _BIT_13)
     words = {int(mask): word for mask, word in zip(masks, bits, strict=True) if word}
@@ -72,14 +72,16 @@ def _row(
 
 _FOLLOWS, _ERROR = "follows the command", "following error"
 _ROWS = (
-    _row("PP", 1, Target.ANGLE, (0x607A, 0), "target reached", "set-point acknowledged", _ERROR),
-    _row("PV", 3, Target.VELOCITY, (0x60FF, 0), "target reached", "speed zero", "slipping"),
-    _row("PT", 4, Target.TORQUE, (0x6071, 0), "target reached", "", ""),
-    _row("HM", 6, Target.NONE, None, "target reached", "homing attained", "homing error"),
-    _row("IP", 7, Target.ANGLE, (0x60C1, 1), "target reached", "following", "", cyclic=True),
-    _row("CSP", 8, Target.ANGLE, (0x607A, 0), "", _FOLLOWS, _ERROR, cyclic=True),
-    _row("CSV", 9, Target.VELOCITY, (0x60FF, 0), "", _FOLLOWS, "", cyclic=True),
-    _row("CST", 10, Target.TORQUE, (0x6071, 0), "", _FOLLOWS, "", cyclic=True),
+    _row(
+        "PP", 1, TargetKind.ANGLE, (0x607A, 0), "target reached", "set-point acknowledged", _ERROR
+    ),
+    _row("PV", 3, TargetKind.VELOCITY, (0x60FF, 0), "target reached", "speed zero", "slipping"),
+    _row("PT", 4, TargetKind.TORQUE, (0x6071, 0), "target reached", "", ""),
+    _row("HM", 6, TargetKind.NONE, None, "target reached", "homing attained", "homing error"),
+    _row("IP", 7, TargetKind.ANGLE, (0x60C1, 1), "target reached", "following", "", cyclic=True),
+    _row("CSP", 8, TargetKind.ANGLE, (0x607A, 0), "", _FOLLOWS, _ERROR, cyclic=True),
+    _row("CSV", 9, TargetKind.VELOCITY, (0x60FF, 0), "", _FOLLOWS, "", cyclic=True),
+    _row("CST", 10, TargetKind.TORQUE, (0x6071, 0), "", _FOLLOWS, "", cyclic=True),
 )
 
 MODES: dict[str, OperationMode] = {row.name: row for row in _ROWS}
@@ -110,7 +112,7 @@ def status_words(mode: str, status: int) -> tuple[str, ...]:
     return tuple(word for mask, word in meaning.items() if status & mask)
 
 
-class Homing(Enum):
+class HomingState(Enum):
     """State of a homing, by bits 13, 12 and 10 of the statusword."""
 
     RUNNING = "running"
@@ -123,23 +125,23 @@ class Homing(Enum):
     @property
     def over(self) -> bool:
         """Whether it has ended, with or without success."""
-        return self in (Homing.DONE, Homing.FAILED)
+        return self in (HomingState.DONE, HomingState.FAILED)
 
 
 _HOMING = {
-    (False, False, False): Homing.RUNNING,
-    (False, False, True): Homing.INTERRUPTED,
-    (False, True, False): Homing.ATTAINED,
-    (False, True, True): Homing.DONE,
-    (True, False, False): Homing.FAILED_MOVING,
-    (True, False, True): Homing.FAILED,
+    (False, False, False): HomingState.RUNNING,
+    (False, False, True): HomingState.INTERRUPTED,
+    (False, True, False): HomingState.ATTAINED,
+    (False, True, True): HomingState.DONE,
+    (True, False, False): HomingState.FAILED_MOVING,
+    (True, False, True): HomingState.FAILED,
 }
 
 
-def homing_state(status: int) -> Homing:
+def homing_state(status: int) -> HomingState:
     """State of a homing in the mode HM; a reserved pattern of the bits counts as failed."""
     bits = (bool(status & _BIT_13), bool(status & _BIT_12), bool(status & _REACHED))
-    return _HOMING.get(bits, Homing.FAILED)
+    return _HOMING.get(bits, HomingState.FAILED)
 
 
 _MODE_TIME = 0.5
@@ -185,7 +187,7 @@ def rest_targets(node: SdoNode, mode: str) -> None:
     """
     row = MODES[mode]
     if row.target is not None:
-        at_rest = node.read(0x6064) if row.kind is Target.ANGLE else 0
+        at_rest = node.read(0x6064) if row.kind is TargetKind.ANGLE else 0
         node.write(*row.target, at_rest)
     for index in _OFFSETS:
         if node.read_if_there(index):

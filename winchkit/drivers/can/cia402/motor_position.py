@@ -50,7 +50,7 @@ class KeptPosition:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _ShownByDrive:
     """What a drive shows before anything is written to it."""
 
     count: int
@@ -93,7 +93,7 @@ class MotorPosition:
         self._kept: KeptPosition | None = None
         self._serial = 0
         self._objects: Mapping[Key, int] = {}
-        self._found: _Found | None = None
+        self._found: _ShownByDrive | None = None
         self._zero: str | None = None
         """Doubt of the zero that the drive has set since it homes; None where it has set none."""
 
@@ -164,7 +164,7 @@ class MotorPosition:
             before = {} if self._kept is None else self._kept.objects
         restarted = _evidence(node, before) if before else ""
         serial = node.read_if_there(*_SERIAL) or 0
-        self._found = _Found(node.read(*_POSITION), serial, restarted)
+        self._found = _ShownByDrive(node.read(*_POSITION), serial, restarted)
 
     def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
         """The counter of a drive that has been set up; a boot-up has reset it."""
@@ -225,7 +225,7 @@ class MotorPosition:
         return self.doubt or (_RESTARTED if self._incremental else "")
 
     def _resume(
-        self, counter: PositionCounter, found: _Found, drive: Commissioned, *, booted: bool
+        self, counter: PositionCounter, found: _ShownByDrive, drive: Commissioned, *, booted: bool
     ) -> None:
         """Go on from the record where the drive's counter has gone on since.
 
@@ -249,7 +249,13 @@ class MotorPosition:
             counter.doubt = f"6064h had wrapped in an earlier process, and {doubt}"
 
     def _break(
-        self, kept: KeptPosition | None, found: _Found, span: int, unit: float, *, booted: bool
+        self,
+        kept: KeptPosition | None,
+        found: _ShownByDrive,
+        span: int,
+        unit: float,
+        *,
+        booted: bool,
     ) -> str:
         """Why the counter may not have gone on since the record, in words; empty where it has."""
         if kept is None:

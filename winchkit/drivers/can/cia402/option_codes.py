@@ -34,19 +34,19 @@ class OptionCode:
 
 
 @dataclass(frozen=True)
-class _Row:
+class _OptionCode:
     index: int
     occasion: str
     meanings: dict[int, str]
 
 
-OPTIONS: dict[str, _Row] = {
-    "quick_stop": _Row(0x605A, "quick stop", _COAST | _RAMPS | _STAY),
-    "shutdown": _Row(0x605B, "shutdown", _COAST | {1: _RAMPS[1]}),
-    "disable_operation": _Row(0x605C, "disable operation", _COAST | {1: _RAMPS[1]}),
-    "halt": _Row(0x605D, "halt", _COAST | _RAMPS),
-    "fault": _Row(0x605E, "fault", _COAST | _RAMPS),
-    "connection_lost": _Row(
+OPTIONS: dict[str, _OptionCode] = {
+    "quick_stop": _OptionCode(0x605A, "quick stop", _COAST | _RAMPS | _STAY),
+    "shutdown": _OptionCode(0x605B, "shutdown", _COAST | {1: _RAMPS[1]}),
+    "disable_operation": _OptionCode(0x605C, "disable operation", _COAST | {1: _RAMPS[1]}),
+    "halt": _OptionCode(0x605D, "halt", _COAST | _RAMPS),
+    "fault": _OptionCode(0x605E, "fault", _COAST | _RAMPS),
+    "connection_lost": _OptionCode(
         0x6007,
         "loss of the host",
         {0: "nothing", 1: "fault", 2: "disable voltage: coast", 3: "quick stop"},
@@ -95,7 +95,7 @@ def set_options(
     return options
 
 
-def _option(row: _Row, value: int | None) -> OptionCode:
+def _option(row: _OptionCode, value: int | None) -> OptionCode:
     meaning = "absent" if value is None else row.meanings.get(value, _UNKNOWN)
     return OptionCode(row.index, row.occasion, value, meaning)
 

@@ -56,7 +56,7 @@ class Disagreement(NamedTuple):
         )
 
 
-class _Point(NamedTuple):
+class _WindowPoint(NamedTuple):
     """Of a window; SI."""
 
     time: float
@@ -69,7 +69,7 @@ class _Point(NamedTuple):
     velocity: float
 
 
-_NOTHING = _Point(-inf, 0.0, 0.0, 0.0, 0.0)
+_NOTHING = _WindowPoint(-inf, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
@@ -91,10 +91,10 @@ class _Window:
 
     def __init__(self, span: float, every: float) -> None:
         self._span, self._every = span, every
-        self.points: deque[_Point] = deque()
+        self.points: deque[_WindowPoint] = deque()
         self._next, self._since = -inf, inf
 
-    def take(self, point: _Point, tolerance: _Tolerance) -> bool:
+    def take(self, point: _WindowPoint, tolerance: _Tolerance) -> bool:
         """Take a point; whether the two have been apart for longer than one can be late."""
         time, angle, integral, way, _ = point
         if time < self._next:
@@ -180,10 +180,10 @@ class PositionAgreement:
         turned = (velocity + before) / 2 * span
         if not 0 <= span <= _GAP or not isfinite(turned):
             self.restart()
-            self._last = _Point(time, angle, 0.0, 0.0, velocity)
+            self._last = _WindowPoint(time, angle, 0.0, 0.0, velocity)
             return self.found is not None
         self._last = point = _new(
-            _Point, (time, angle, integral + turned, way + abs(turned), velocity)
+            _WindowPoint, (time, angle, integral + turned, way + abs(turned), velocity)
         )
         if velocity != before:
             self._learn_step(abs(velocity - before))

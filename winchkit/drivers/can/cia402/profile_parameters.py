@@ -7,7 +7,7 @@ from math import pi
 
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import parse_object
-from winchkit.drivers.can.cia402.units import Scale
+from winchkit.drivers.can.cia402.units import CountScale
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
@@ -41,7 +41,7 @@ class HomingSpec:
 def set_profile(
     node: SdoNode,
     servo: ServoSpec,
-    scale: Scale,
+    scale: CountScale,
     *,
     speed: float | None = None,
     acceleration: float | None = None,
@@ -59,7 +59,7 @@ def set_profile(
                 node.write_verified(index, 0, counts)
 
 
-def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: Scale, acceleration: float) -> None:
+def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: CountScale, acceleration: float) -> None:
     """Set the ramp of quick stops (6085h, rad/s^2) and read it back.
 
     Raises NotPermitted where a quick stop does not use it (605Ah), NoReply, DeviceRefused.
@@ -102,7 +102,7 @@ def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec) -> None:
             )
 
 
-def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec) -> None:
+def set_homing(node: SdoNode, servo: ServoSpec, scale: CountScale, homing: HomingSpec) -> None:
     """Write a homing's parameters and read them back.
 
     A method that moves nothing needs neither speeds (a drive may refuse a speed above its own
@@ -122,7 +122,7 @@ def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec
         node.write_verified(*home_offset, scale.angle_counts(homing.offset))
 
 
-def _ramp(servo: ServoSpec, scale: Scale, acceleration: float) -> int:
+def _ramp(servo: ServoSpec, scale: CountScale, acceleration: float) -> int:
     """Counts of an acceleration, or of the time that a drive wants instead; never none."""
     _positive(acceleration, "acceleration", "rad/s^2")
     if servo.quirks.ramps_are_times:

@@ -8,7 +8,7 @@ stop. Expedited transfers of CiA 301: download 2Bh, reply 60h; upload 40h, reply
 from __future__ import annotations
 
 from winchkit.drivers.can.bus.bus import SDO_SIZE, CanBus
-from winchkit.drivers.can.cia402.state_machine import State, state_of
+from winchkit.drivers.can.cia402.state_machine import DriveState, state_of
 
 _REQUEST, _REPLY = 0x600, 0x580
 _WRITE = bytes.fromhex("2B40600002000000")
@@ -31,7 +31,7 @@ class SdoStop:
         """Whether the drive has confirmed the write."""
         self.refused = False
         """Whether it has aborted it."""
-        self.state: State | None = None
+        self.state: DriveState | None = None
         """Power state by a status word that was asked for after that."""
 
     def send(self) -> None:

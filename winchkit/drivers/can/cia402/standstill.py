@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf, isfinite, nan
 
 from winchkit.drivers.can.canopen.node import SdoNode
-from winchkit.drivers.can.cia402.units import Scale, read_scale
+from winchkit.drivers.can.cia402.units import CountScale, read_scale
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
@@ -30,7 +30,7 @@ class Standstill:
     still after its position has stayed within ``travel`` for the window.
     """
 
-    def __init__(self, scale: Scale) -> None:
+    def __init__(self, scale: CountScale) -> None:
         self.speed = max(_CREEP, _SPEED_COUNTS * scale.velocity)
         """Reported speed that counts as none, rad/s."""
         self.travel = max(_CREEP * _WINDOW, _ANGLE_COUNTS * scale.angle)
@@ -64,7 +64,7 @@ class PolledStandstill:
             scale = read_scale(node, servo)
         except NotPermitted:
             # Units that cannot be meant say nothing of standing still: whole counts decide.
-            scale = Scale(nan, nan, nan)
+            scale = CountScale(nan, nan, nan)
         self._node, self._clock, self._scale = node, clock, scale
         self._standstill = Standstill(scale)
 

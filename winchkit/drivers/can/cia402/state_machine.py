@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 
-class State(IntEnum):
+class DriveState(IntEnum):
     """States of the power state machine; UNKNOWN is a status word that fits none."""
 
     UNKNOWN = -1
@@ -27,7 +27,7 @@ class State(IntEnum):
         return _STATE_WORDS[self + 1]
 
 
-_STATE_WORDS = tuple(state.name.lower().replace("_", " ") for state in State)
+_STATE_WORDS = tuple(state.name.lower().replace("_", " ") for state in DriveState)
 
 
 class StatusBit(IntEnum):
@@ -58,12 +58,12 @@ class RequestedState(Enum):
 
 
 @dataclass(frozen=True)
-class Transition:
+class StateTransition:
     """A row of the standard's table; ``control`` is the word that commands it, if any."""
 
     number: int
-    source: State
-    target: State
+    source: DriveState
+    target: DriveState
     control: int | None
 
 
@@ -76,39 +76,47 @@ FAULT_RESET = 0x80
 HALT = 0x100
 """Bits of the control word 6040h for each command of CiA 402's table of commands; halt is bit 8."""
 
-TRANSITIONS: tuple[Transition, ...] = (
-    Transition(1, State.NOT_READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, None),
-    Transition(2, State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, SHUTDOWN),
-    Transition(3, State.READY_TO_SWITCH_ON, State.SWITCHED_ON, SWITCH_ON),
-    Transition(4, State.SWITCHED_ON, State.OPERATION_ENABLED, ENABLE_OPERATION),
-    Transition(5, State.OPERATION_ENABLED, State.SWITCHED_ON, SWITCH_ON),
-    Transition(6, State.SWITCHED_ON, State.READY_TO_SWITCH_ON, SHUTDOWN),
-    Transition(7, State.READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
-    Transition(8, State.OPERATION_ENABLED, State.READY_TO_SWITCH_ON, SHUTDOWN),
-    Transition(9, State.OPERATION_ENABLED, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
-    Transition(10, State.SWITCHED_ON, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
-    Transition(11, State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, QUICK_STOP),
-    Transition(12, State.QUICK_STOP_ACTIVE, State.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
-    Transition(14, State.FAULT_REACTION_ACTIVE, State.FAULT, None),
-    Transition(15, State.FAULT, State.SWITCH_ON_DISABLED, FAULT_RESET),
-    Transition(16, State.QUICK_STOP_ACTIVE, State.OPERATION_ENABLED, ENABLE_OPERATION),
+TRANSITIONS: tuple[StateTransition, ...] = (
+    StateTransition(1, DriveState.NOT_READY_TO_SWITCH_ON, DriveState.SWITCH_ON_DISABLED, None),
+    StateTransition(2, DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, SHUTDOWN),
+    StateTransition(3, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCHED_ON, SWITCH_ON),
+    StateTransition(4, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED, ENABLE_OPERATION),
+    StateTransition(5, DriveState.OPERATION_ENABLED, DriveState.SWITCHED_ON, SWITCH_ON),
+    StateTransition(6, DriveState.SWITCHED_ON, DriveState.READY_TO_SWITCH_ON, SHUTDOWN),
+    StateTransition(
+        7, DriveState.READY_TO_SWITCH_ON, DriveState.SWITCH_ON_DISABLED, DISABLE_VOLTAGE
+    ),
+    StateTransition(8, DriveState.OPERATION_ENABLED, DriveState.READY_TO_SWITCH_ON, SHUTDOWN),
+    StateTransition(
+        9, DriveState.OPERATION_ENABLED, DriveState.SWITCH_ON_DISABLED, DISABLE_VOLTAGE
+    ),
+    StateTransition(10, DriveState.SWITCHED_ON, DriveState.SWITCH_ON_DISABLED, DISABLE_VOLTAGE),
+    StateTransition(11, DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE, QUICK_STOP),
+    StateTransition(
+        12, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED, DISABLE_VOLTAGE
+    ),
+    StateTransition(14, DriveState.FAULT_REACTION_ACTIVE, DriveState.FAULT, None),
+    StateTransition(15, DriveState.FAULT, DriveState.SWITCH_ON_DISABLED, FAULT_RESET),
+    StateTransition(
+        16, DriveState.QUICK_STOP_ACTIVE, DriveState.OPERATION_ENABLED, ENABLE_OPERATION
+    ),
 )
 """Transition 13, from any state into fault reaction, has no row: no word commands it."""
 
-_STATUS: tuple[tuple[int, int, State], ...] = (
-    (0x4F, 0x00, State.NOT_READY_TO_SWITCH_ON),
-    (0x4F, 0x40, State.SWITCH_ON_DISABLED),
-    (0x6F, 0x21, State.READY_TO_SWITCH_ON),
-    (0x6F, 0x23, State.SWITCHED_ON),
-    (0x6F, 0x27, State.OPERATION_ENABLED),
-    (0x6F, 0x07, State.QUICK_STOP_ACTIVE),
-    (0x4F, 0x0F, State.FAULT_REACTION_ACTIVE),
-    (0x4F, 0x08, State.FAULT),
+_STATUS: tuple[tuple[int, int, DriveState], ...] = (
+    (0x4F, 0x00, DriveState.NOT_READY_TO_SWITCH_ON),
+    (0x4F, 0x40, DriveState.SWITCH_ON_DISABLED),
+    (0x6F, 0x21, DriveState.READY_TO_SWITCH_ON),
+    (0x6F, 0x23, DriveState.SWITCHED_ON),
+    (0x6F, 0x27, DriveState.OPERATION_ENABLED),
+    (0x6F, 0x07, DriveState.QUICK_STOP_ACTIVE),
+    (0x4F, 0x0F, DriveState.FAULT_REACTION_ACTIVE),
+    (0x4F, 0x08, DriveState.FAULT),
 )
 
 _ENABLING = {
     row.source: row.control for row in TRANSITIONS if row.number in (2, 3, 4) and row.control
-} | {State.OPERATION_ENABLED: ENABLE_OPERATION}
+} | {DriveState.OPERATION_ENABLED: ENABLE_OPERATION}
 _FRESH = 1
 """A status word of the SYNC before is the newest where the answer to this one is on its way."""
 _RAMP_AGE = 5
@@ -122,11 +130,11 @@ def _enables(word: int) -> bool:
     return word & (FAULT_RESET | ENABLE_OPERATION) == ENABLE_OPERATION
 
 
-def _said(status: int) -> State:
+def _said(status: int) -> DriveState:
     for mask, value, state in _STATUS:
         if status & mask == value:
             return state
-    return State.UNKNOWN
+    return DriveState.UNKNOWN
 
 
 STATE_BITS = 0x6F
@@ -135,13 +143,13 @@ STATES = tuple(_said(bits) for bits in range(STATE_BITS + 1))
 """The power state by these bits."""
 
 
-def state_of(status: int) -> State:
+def state_of(status: int) -> DriveState:
     """Power state that a status word 6041h says."""
     return STATES[status & STATE_BITS]
 
 
 def control_word(
-    state: State,
+    state: DriveState,
     requested: RequestedState,
     *,
     previous: int = 0,
@@ -161,15 +169,15 @@ def control_word(
     if requested is _ENABLE and state in _ENABLING:
         return _ENABLING[state]
     fresh = age <= _FRESH
-    stays = requested in _STAYING and state is State.OPERATION_ENABLED and age <= _RAMP_AGE
+    stays = requested in _STAYING and state is DriveState.OPERATION_ENABLED and age <= _RAMP_AGE
     if stays and _enables(previous):
         return _STAYING[requested]
     if (
         fresh
-        and state is State.FAULT
+        and state is DriveState.FAULT
         and requested is RequestedState.RESET
         and not previous & FAULT_RESET
     ):
         return FAULT_RESET
     leaves = requested in (RequestedState.DISABLE, RequestedState.ENABLE) and fresh and at_rest
-    return DISABLE_VOLTAGE if leaves and state is State.QUICK_STOP_ACTIVE else QUICK_STOP
+    return DISABLE_VOLTAGE if leaves and state is DriveState.QUICK_STOP_ACTIVE else QUICK_STOP

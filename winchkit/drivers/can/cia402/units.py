@@ -24,7 +24,7 @@ _TIMES = {0x03: 1.0, 0x47: 60.0}
 
 
 @dataclass(frozen=True)
-class Scale:
+class CountScale:
     """SI value of one count."""
 
     angle: float
@@ -76,7 +76,7 @@ def _counts(value: float, unit: float, most: int, name: str, symbol: str) -> int
 
 
 @dataclass(frozen=True)
-class Units:
+class UnitObjects:
     """Objects of a drive that define its units; None where it has none, or it is zero."""
 
     encoder: float | None = None
@@ -95,7 +95,7 @@ class Units:
     """6075h, A."""
 
 
-def read_units(node: SdoNode) -> Units:
+def read_units(node: SdoNode) -> UnitObjects:
     """Read everything that says something of units; raises NoReply, DeviceRefused."""
 
     def ratio(index: int) -> float | None:
@@ -106,7 +106,7 @@ def read_units(node: SdoNode) -> Units:
         value = node.read_if_there(index)
         return value * 1e-3 if value else None
 
-    return Units(
+    return UnitObjects(
         encoder=ratio(0x608F),
         gear=ratio(0x6091),
         feed=ratio(0x6092),
@@ -117,7 +117,7 @@ def read_units(node: SdoNode) -> Units:
     )
 
 
-def scale_of(units: Units, servo: ServoSpec) -> Scale:
+def scale_of(units: UnitObjects, servo: ServoSpec) -> CountScale:
     """Scale at the motor shaft, with values of the device file where the drive has none.
 
     Positions count ``feed / gear`` units a motor turn (CiA 402-2, position actual value), or
@@ -125,7 +125,7 @@ def scale_of(units: Units, servo: ServoSpec) -> Scale:
     in the unit of 60A9h, else in the device file's. Raises NotPermitted for a scale that no
     encoder has.
     """
-    said = units if servo.units == "drive" else Units()
+    said = units if servo.units == "drive" else UnitObjects()
     gear = said.gear or 1.0
     encoder = said.encoder or float(servo.increments_per_turn)
     named = _rotary(said.position, per_time=False)
@@ -149,7 +149,7 @@ def scale_of(units: Units, servo: ServoSpec) -> Scale:
     else:
         velocity = _declared(servo.speed_unit, "speed", angle, encoder)
     torque = (units.rated_torque or servo.rated_torque) * _PER_MILLE
-    return Scale(angle, velocity, torque, (units.rated_current or nan) * _PER_MILLE)
+    return CountScale(angle, velocity, torque, (units.rated_current or nan) * _PER_MILLE)
 
 
 def _declared(text: str, of: str, increment: float, encoder: float) -> float:
@@ -158,7 +158,7 @@ def _declared(text: str, of: str, increment: float, encoder: float) -> float:
     return float(unit.factor * increment**unit.increments * encoder**unit.encoder)
 
 
-def read_scale(node: SdoNode, servo: ServoSpec) -> Scale:
+def read_scale(node: SdoNode, servo: ServoSpec) -> CountScale:
     """Scale of a drive; raises NotPermitted, NoReply, DeviceRefused."""
     try:
         return scale_of(read_units(node), servo)

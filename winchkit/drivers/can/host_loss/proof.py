@@ -9,7 +9,12 @@ from winchkit.drivers.can.canopen.emergency import Emergency
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.option_codes import BY_6007, OptionCode
-from winchkit.drivers.can.cia402.state_machine import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
+from winchkit.drivers.can.cia402.state_machine import (
+    DISABLE_VOLTAGE,
+    FAULT_RESET,
+    DriveState,
+    state_of,
+)
 from winchkit.drivers.can.host_loss.guarding import Guarding
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
 from winchkit.drivers.clock import Clock
@@ -24,7 +29,7 @@ _SETTLING = 1.0
 """s: for the transition after a fault reset or a quick stop at rest; drives take some tenths."""
 _POLL = 0.002
 """s: resolution of the measured delay, 2 % of the shortest limit (0.1 s)."""
-_FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+_FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _STOPPING = (1, 2, 3)
 """Of 6007h: fault, disable voltage, quick stop."""
 
@@ -127,12 +132,12 @@ def reaction(
 
 def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
     """Reset the fault that the silence caused, without enabling, and start the node again."""
-    if state_of(node.read(0x6041)) is State.FAULT_REACTION_ACTIVE:
-        _await_state(node, clock, State.FAULT)
-    if clears and state_of(node.read(0x6041)) is State.FAULT:
+    if state_of(node.read(0x6041)) is DriveState.FAULT_REACTION_ACTIVE:
+        _await_state(node, clock, DriveState.FAULT)
+    if clears and state_of(node.read(0x6041)) is DriveState.FAULT:
         node.write(0x6040, 0, DISABLE_VOLTAGE)
         node.write(0x6040, 0, FAULT_RESET)
-        _await_state(node, clock, State.SWITCH_ON_DISABLED)
+        _await_state(node, clock, DriveState.SWITCH_ON_DISABLED)
         node.write(0x6040, 0, DISABLE_VOLTAGE)
     node.bus.nmt(_START, node.node)
 
@@ -189,7 +194,7 @@ def _unnoticed(mechanism: Mechanism, proof: Proof) -> str:
     )
 
 
-def _await_state(node: SdoNode, clock: Clock, wanted: State) -> None:
+def _await_state(node: SdoNode, clock: Clock, wanted: DriveState) -> None:
     deadline = clock.now() + _SETTLING
     while (state := state_of(node.read(0x6041))) is not wanted:
         if clock.now() > deadline:

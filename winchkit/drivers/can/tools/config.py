@@ -19,7 +19,7 @@ from canopen.objectdictionary import ODVariable, datatypes
 
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.node import Objects, Value, object_name, variables
-from winchkit.drivers.can.cia402.state_machine import State, state_of
+from winchkit.drivers.can.cia402.state_machine import DriveState, state_of
 from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
@@ -53,7 +53,7 @@ _NOT_SETTINGS = (
     range(0x6502, 0x6503),  # supported modes
 )
 _TYPES = {*datatypes.NUMBER_TYPES, datatypes.BOOLEAN, datatypes.VISIBLE_STRING}
-_QUIET = (State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.FAULT)
+_QUIET = (DriveState.SWITCH_ON_DISABLED, DriveState.READY_TO_SWITCH_ON, DriveState.FAULT)
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def check_fits(config: Config, found: Identity, path: str) -> None:
 def check_quiet(objects: Objects) -> None:
     """Raise NotPermitted while the drive is enabled or about to be."""
     status = objects.number(0x6041)
-    state = State.UNKNOWN if status is None else state_of(status)
+    state = DriveState.UNKNOWN if status is None else state_of(status)
     if status is not None and state not in _QUIET:
         raise NotPermitted(f"the drive is {state}; stop it before its settings are changed")
 

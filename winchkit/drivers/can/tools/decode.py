@@ -107,7 +107,7 @@ class KnownNode:
 
 
 @dataclass(frozen=True)
-class Decoded:
+class DecodedFrame:
     """A frame in words."""
 
     kind: str
@@ -153,14 +153,14 @@ def number_of(bits: int, size: int, index: int, sub: int, dictionary: Any) -> fl
     return bits - (1 << size) if is_negative else bits
 
 
-def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
+def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> DecodedFrame:
     """Meaning of a frame; one that is not understood is shown as bytes."""
     if identifier == 0x000 and len(data) == 2:
         return _nmt(data, nodes)
     if identifier == 0x080:
-        return Decoded("SYNC", 0, "SYNC")
+        return DecodedFrame("SYNC", 0, "SYNC")
     if identifier in (0x7E4, 0x7E5) and len(data) == 8:
-        return Decoded("LSS", 0, _lss(data, reply=identifier == 0x7E4))
+        return DecodedFrame("LSS", 0, _lss(data, reply=identifier == 0x7E4))
     node = identifier & 0x7F
     known = nodes.get(node, KnownNode(f"node {node}"))
     for number, one in nodes.items():
@@ -169,12 +169,14 @@ def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Deco
     base = identifier & ~0x7F
     raw = data.hex(" ") or "no bytes"
     if base in _PDOS and node:
-        return Decoded(_PDOS[base], node, f"{known.name}: {raw}")
+        return DecodedFrame(_PDOS[base], node, f"{known.name}: {raw}")
     kind, words = _of_node(base, data, known) if node else ("other", "")
-    return Decoded(kind, node, f"{known.name}: {words}") if words else Decoded(kind, 0, raw)
+    return (
+        DecodedFrame(kind, node, f"{known.name}: {words}") if words else DecodedFrame(kind, 0, raw)
+    )
 
 
-def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> Decoded:
+def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> DecodedFrame:
     """A PDO in words; one of another length has words and no values."""
     values = pdo.values(data, known.dictionary)
     words = _mapped(values, known) or data.hex(" ")
@@ -182,13 +184,13 @@ def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> Decoded:
         words += f" ({len(data)} bytes; its mapping has {pdo.size})"
         values = {}
     plain = {object_name(*key): value for key, value in values.items()}
-    return Decoded(pdo.kind, node, f"{known.name}: {words}", plain)
+    return DecodedFrame(pdo.kind, node, f"{known.name}: {words}", plain)
 
 
-def _nmt(data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
+def _nmt(data: bytes, nodes: Mapping[int, KnownNode]) -> DecodedFrame:
     command, node = data
     who = nodes[node].name if node in nodes else f"node {node}" if node else "all nodes"
-    return Decoded("NMT", node, f"{who}: {command_text(command)}")
+    return DecodedFrame("NMT", node, f"{who}: {command_text(command)}")
 
 
 def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:

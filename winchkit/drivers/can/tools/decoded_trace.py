@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_types
 from winchkit.can_trace import TraceFrame, read_trace
-from winchkit.drivers.can.tools.decode import Decoded
+from winchkit.drivers.can.tools.decode import DecodedFrame
 from winchkit.drivers.can.tools.trace_decoder import (
     Description,
     TraceDecoder,
@@ -30,7 +30,7 @@ class DecodedTrace:
         The file.
     layout : str
         Its format.
-    frames : tuple of (TraceFrame, Decoded)
+    frames : tuple of (TraceFrame, DecodedFrame)
         Each frame with its meaning, in the order of the file.
     nodes : mapping of (str, int) to TracedNode
         Nodes by bus and number, with what the trace shows of their objects.
@@ -40,7 +40,7 @@ class DecodedTrace:
 
     path: str
     layout: str
-    frames: tuple[tuple[TraceFrame, Decoded], ...]
+    frames: tuple[tuple[TraceFrame, DecodedFrame], ...]
     nodes: Mapping[tuple[str, int], TracedNode]
     notes: tuple[str, ...]
 

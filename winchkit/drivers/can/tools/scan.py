@@ -36,7 +36,7 @@ _DICTIONARY: Any = canopen.ObjectDictionary
 
 
 @dataclass(frozen=True)
-class Found:
+class ScannedNode:
     """A node of a bus."""
 
     bus: str
@@ -95,7 +95,7 @@ def scan(
     clock: Clock,
     listen: float,
     own: Mapping[int, Cia402Axis] | None = None,
-) -> list[Found]:
+) -> list[ScannedNode]:
     """Ask every node number for its device type and listen for ``listen`` s.
 
     Reads only. A node that refuses, falls silent or answers what cannot be read is reported with
@@ -153,7 +153,7 @@ class _NodeListener:
             self.bus.pass_on(_SDO_REPLY + self.node, data, now)
 
 
-def _reported(listener: _NodeListener) -> Found:
+def _reported(listener: _NodeListener) -> ScannedNode:
     """A node that this host does not drive, with what is wrong with it."""
     if not listener.replies:
         # It may have been booting when it was asked.
@@ -199,15 +199,15 @@ def _safely(port: ObjectPort, index: int, sub: int = 0) -> int | None:
         return None
 
 
-def named_after(spec: BenchSpec, found: list[Found]) -> list[Found]:
+def named_after(spec: BenchSpec, found: list[ScannedNode]) -> list[ScannedNode]:
     """The same with the winches of a bench file."""
     winches = {(one.servo.bus, one.servo.node): name for name, one in spec.winch.items()}
     return [replace(item, winch=winches.get((item.bus, item.node), "")) for item in found]
 
 
-def _ask(bus: CanBus, node: int, port: ObjectPort | None) -> Found:
+def _ask(bus: CanBus, node: int, port: ObjectPort | None) -> ScannedNode:
     """Device type, identity and name of a node, as far as it answers."""
-    found = Found(bus.name, node, Identity(), None, "", "", "")
+    found = ScannedNode(bus.name, node, Identity(), None, "", "", "")
     if port is None:
         return found
     try:

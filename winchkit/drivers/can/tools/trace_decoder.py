@@ -26,9 +26,9 @@ from winchkit.drivers.can.canopen.pdo_parameters import (
     cob_id,
 )
 from winchkit.drivers.can.cia402.modes import mode_named
-from winchkit.drivers.can.cia402.units import Scale, Units, scale_of
+from winchkit.drivers.can.cia402.units import CountScale, UnitObjects, scale_of
 from winchkit.drivers.can.tools.decode import (
-    Decoded,
+    DecodedFrame,
     Key,
     KnownNode,
     MappedPdo,
@@ -88,7 +88,7 @@ def read_description(path: str) -> Description:
 
 
 @dataclass
-class _Transfer:
+class _TracedTransfer:
     """An SDO transfer under way."""
 
     key: Key
@@ -115,7 +115,7 @@ class TracedNode:
         self.misfits: Counter[tuple[MappedPdo, int]] = Counter()
         """Frames of another length than their mapping, by PDO and bytes."""
         self.known = KnownNode(f"node {node}", dictionary, _pdos(self.values, node))
-        self._transfer: _Transfer | None = None
+        self._transfer: _TracedTransfer | None = None
 
     def restart(self) -> None:
         """Forget what was set up, as a node does at its boot-up."""
@@ -139,7 +139,7 @@ class TracedNode:
             self._transfer = None
         elif is_request and command in (1, 2):
             content = expedited(data) if command == 1 else None
-            self._transfer = _Transfer(
+            self._transfer = _TracedTransfer(
                 place_of(data), command == 1, content or b"", content is not None
             )
         elif command in (5, 6):
@@ -149,7 +149,7 @@ class TracedNode:
         return "", {}
 
     def _follow_content(
-        self, transfer: _Transfer, data: bytes, *, is_request: bool
+        self, transfer: _TracedTransfer, data: bytes, *, is_request: bool
     ) -> tuple[str, dict[str, float]]:
         command, is_source = data[0] >> 5, is_request == transfer.is_write
         words = ""
@@ -169,7 +169,7 @@ class TracedNode:
         command = data[0] >> 5
         kind = data[0] & (1 if command == 6 else 3)
         if is_request and kind == 0:
-            self._transfer = _Transfer(place_of(data), command == 6)
+            self._transfer = _TracedTransfer(place_of(data), command == 6)
             return ""
         if (transfer := self._transfer) is None:
             return "block transfer"
@@ -179,7 +179,7 @@ class TracedNode:
             self._transfer = None
         return f"block transfer of {object_name(*transfer.key)}" + (", end" if kind == 1 else "")
 
-    def _keep(self, transfer: _Transfer) -> dict[str, float]:
+    def _keep(self, transfer: _TracedTransfer) -> dict[str, float]:
         """Store a value that was written and confirmed, or read."""
         self._transfer = None
         key, size = transfer.key, 8 * len(transfer.content)
@@ -196,7 +196,7 @@ class TracedNode:
             self.known = replace(self.known, mode=mode_named(int(value)))
         return {} if transfer.is_write else {object_name(*key): value}
 
-    def scale(self) -> Scale | None:
+    def scale(self) -> CountScale | None:
         """SI value of a count by a device file of a drive, and by what the trace has of its units.
 
         None without such a file. Raises NotPermitted for a scale that no encoder has.
@@ -214,7 +214,7 @@ class TracedNode:
         def code(index: int) -> int | None:
             return None if (index, 0) not in self.seen else int(self.seen[index, 0])
 
-        units = Units(
+        units = UnitObjects(
             encoder=ratio(0x608F),
             gear=ratio(0x6091),
             feed=ratio(0x6092),
@@ -272,12 +272,12 @@ class TraceDecoder:
         for node in self.by_node:
             self._hear(node)
 
-    def decode(self, frame: TraceFrame) -> Decoded:
+    def decode(self, frame: TraceFrame) -> DecodedFrame:
         """Meaning of a frame; raises FileError for an EDS that does not fit a node's number."""
         identifier, data = frame.identifier, frame.data
         node, base = identifier & 0x7F, identifier & ~0x7F
         if identifier > _IDENTIFIER:
-            return Decoded("other", 0, data.hex(" "))
+            return DecodedFrame("other", 0, data.hex(" "))
         if base in (_REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY) and node:
             return self._of_service(base, data, self._hear(node), frame)
         nodes = {number: one.known for number, one in self.nodes.items()}
@@ -300,7 +300,9 @@ class TraceDecoder:
         """Nodes of the trace by number, those with PDOs only included."""
         return {**self._assumed, **self.nodes}
 
-    def _of_service(self, base: int, data: bytes, one: TracedNode, frame: TraceFrame) -> Decoded:
+    def _of_service(
+        self, base: int, data: bytes, one: TracedNode, frame: TraceFrame
+    ) -> DecodedFrame:
         if base == _HEARTBEAT and data[:1] == b"\0":
             one.restart()
         nodes = {one.node: one.known}

@@ -36,7 +36,7 @@ _WINDOWS = 6
 
 
 @dataclass(frozen=True)
-class Signal:
+class TimedSignal:
     """One channel over time."""
 
     channel: str
@@ -100,19 +100,19 @@ class Agreement:
         )
 
 
-def signals_by_base(streams: Streams) -> dict[str, list[Signal]]:
+def signals_by_base(streams: Streams) -> dict[str, list[TimedSignal]]:
     """Varying channels of a file by their name without a winch's."""
-    found: dict[str, list[Signal]] = {}
+    found: dict[str, list[TimedSignal]] = {}
     for item in streams.streams:
         for name, values in item.channels.items():
             known = np.isfinite(values) & np.isfinite(item.time)
             if np.count_nonzero(known) >= 16 and np.ptp(values[known]) > 0:
-                signal = Signal(name, item.time[known], values[known])
+                signal = TimedSignal(name, item.time[known], values[known])
                 found.setdefault(name.rpartition(".")[2], []).append(signal)
     return found
 
 
-def correlated(one: Signal, two: Signal) -> Agreement | None:
+def correlated(one: TimedSignal, two: TimedSignal) -> Agreement | None:
     """Lag with the largest magnitude of the correlation."""
     # The slower sampling limits both: the faster signal is averaged over the slower interval.
     interval = max(interval_of(one), interval_of(two))
@@ -144,7 +144,9 @@ def correlated(one: Signal, two: Signal) -> Agreement | None:
     return agreement_at(peak, one, two, b, step)
 
 
-def agreement_at(peak: Peak, one: Signal, two: Signal, even: Array, step: float) -> Agreement:
+def agreement_at(
+    peak: Peak, one: TimedSignal, two: TimedSignal, even: Array, step: float
+) -> Agreement:
     """Agreement at the lag of the largest correlation; a known lag is refined, with its drift.
 
     ``even`` are samples of a signal at even steps, of which the standard deviation of the lag is.
@@ -171,12 +173,12 @@ def agreement_at(peak: Peak, one: Signal, two: Signal, even: Array, step: float)
     )
 
 
-def interval_of(signal: Signal) -> float:
+def interval_of(signal: TimedSignal) -> float:
     """Mean interval of the samples, s."""
     return float(np.ptp(signal.time)) / (len(signal.time) - 1)
 
 
-def _even(signal: Signal, step: float, window: float) -> Array:
+def _even(signal: TimedSignal, step: float, window: float) -> Array:
     """Samples at even times, averaged over a window where the signal has a finer sampling."""
     time = signal.time[0] + step * np.arange(int(np.ptp(signal.time) / step) + 1)
     own = interval_of(signal)
@@ -286,7 +288,7 @@ def _lag_std(b: Array, step: float, peak: Peak) -> float:
 
 
 def _drift(
-    one: Signal, two: Signal, lag: float, window: float, middle: float
+    one: TimedSignal, two: TimedSignal, lag: float, window: float, middle: float
 ) -> tuple[float, float, float, float, float]:
     """Drift of the clocks from the lags of parts of the recording, by a weighted line.
 
@@ -300,7 +302,7 @@ def _drift(
         inside = (two.time >= start) & (two.time <= end)
         if np.count_nonzero(inside) < 16 or np.ptp(two.values[inside]) == 0:
             continue
-        part = Signal(two.channel, two.time[inside], two.values[inside])
+        part = TimedSignal(two.channel, two.time[inside], two.values[inside])
         found = _local_lag(one, part, lag=lag, reach=reach, window=window)
         if found is not None:
             times.append(0.5 * (start + end))
@@ -321,7 +323,7 @@ def _drift(
 
 
 def _local_lag(
-    one: Signal, two: Signal, *, lag: float, reach: float, window: float
+    one: TimedSignal, two: TimedSignal, *, lag: float, reach: float, window: float
 ) -> tuple[float, float] | None:
     """Lag near an approximate one by least squares, with its standard deviation."""
     step = window / 4

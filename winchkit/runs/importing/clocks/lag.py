@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from winchkit.runs.importing.clocks.cross_correlation import (
     Agreement,
-    Signal,
+    TimedSignal,
     correlated,
     signals_by_base,
 )
@@ -79,7 +79,7 @@ def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float =
     return replace(streams, streams=moved)
 
 
-def _signals(first: Streams, second: Streams) -> Iterator[tuple[Signal, Signal]]:
+def _signals(first: Streams, second: Streams) -> Iterator[tuple[TimedSignal, TimedSignal]]:
     """Pairs of signals of the two files."""
     ours, theirs = signals_by_base(first), signals_by_base(second)
     for one, two in _PAIRS:

@@ -24,7 +24,7 @@ from winchkit.runs.importing.clocks.cross_correlation import (
     LEAST_OVERLAP,
     Agreement,
     Peak,
-    Signal,
+    TimedSignal,
     agreement_at,
     independent_count,
     interval_of,
@@ -58,7 +58,7 @@ def pose_agreement(first: Streams, second: Streams) -> Agreement | None:
 
 
 def _agreement(
-    angles: Sequence[Signal], position: Sequence[Signal], *, lines_first: bool
+    angles: Sequence[TimedSignal], position: Sequence[TimedSignal], *, lines_first: bool
 ) -> Agreement | None:
     interval = max(interval_of(signal) for signal in (*angles, *position))
     spans = [float(np.ptp(signal.time)) for signal in (*angles, *position)]
@@ -91,20 +91,20 @@ def _agreement(
     return agreement_at(peak, one, two, fitted[:, widest], step)
 
 
-def _even_columns(signals: Sequence[Signal], step: float) -> tuple[float, Array]:
+def _even_columns(signals: Sequence[TimedSignal], step: float) -> tuple[float, Array]:
     """Common start of signals, and their samples at even times, shape (n, signals)."""
     start, end = _common_span(signals)
     count = max(0, int((end - start) / step)) + 1
     return start, _columns_at(signals, np.linspace(start, start + step * (count - 1), count))
 
 
-def _common_span(signals: Sequence[Signal]) -> tuple[float, float]:
+def _common_span(signals: Sequence[TimedSignal]) -> tuple[float, float]:
     """Times between which all signals have samples, s."""
     starts, ends = ([float(signal.time[n]) for signal in signals] for n in (0, -1))
     return max(starts), min(ends)
 
 
-def _columns_at(signals: Sequence[Signal], time: Array) -> Array:
+def _columns_at(signals: Sequence[TimedSignal], time: Array) -> Array:
     """Signals at given times, shape (n, signals)."""
     return np.stack([np.interp(time, own.time, own.values) for own in signals], axis=1)
 
@@ -142,7 +142,7 @@ def _multiple_correlation(x: Array, y: Array, lag: int) -> float:
     return math.sqrt(max(0.0, 1 - float(np.sum(rest**2)) / total))
 
 
-def _predicted(angles: Sequence[Signal], measured: Signal, lag: float) -> Signal:
+def _predicted(angles: Sequence[TimedSignal], measured: TimedSignal, lag: float) -> TimedSignal:
     """A coordinate by the angles at all of their samples, fitted at a lag."""
     start, end = _common_span(angles)
     time = angles[0].time[(angles[0].time >= start) & (angles[0].time <= end)]
@@ -152,4 +152,4 @@ def _predicted(angles: Sequence[Signal], measured: Signal, lag: float) -> Signal
     b = np.interp(time[inside], at, measured.values)[:, None]
     centre = x[inside].mean(axis=0)
     values = (x - centre) @ _solved(x[inside] - centre, b)
-    return Signal(f"motor angles of {len(angles)} lines", time, values[:, 0] + float(b.mean()))
+    return TimedSignal(f"motor angles of {len(angles)} lines", time, values[:, 0] + float(b.mean()))

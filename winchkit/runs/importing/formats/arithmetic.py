@@ -12,7 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.runs.importing.formats.cells import number
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_spelling import read_unit
 
 _OPERATOR = re.compile(r"\s*([-+*])\s*")
@@ -23,14 +23,14 @@ def is_expression(source: str) -> bool:
     return bool(_OPERATOR.search(source.strip()[1:]))
 
 
-def with_derived(table: Table, sources: Iterable[str]) -> Table:
+def with_derived(table: ColumnTable, sources: Iterable[str]) -> ColumnTable:
     """The table with a further column for every source that is an expression of its columns.
 
     ``sources``: names, numbers of columns, and expressions; only the last are added. Returns: the
     unit of a sum is that of its columns, which is the same for all or convertible; a product of
     columns has none. A name with an operator is that column.
     """
-    added: list[Column] = []
+    added: list[FileColumn] = []
     for source in dict.fromkeys(sources):
         if table.column(source) is None and is_expression(source):
             derived = _derived(table, source, len(table.columns) + len(added) + 1)
@@ -38,7 +38,7 @@ def with_derived(table: Table, sources: Iterable[str]) -> Table:
     return replace(table, columns=(*table.columns, *added)) if added else table
 
 
-def _derived(table: Table, source: str, place: int) -> Column | None:
+def _derived(table: ColumnTable, source: str, place: int) -> FileColumn | None:
     """The column of an expression; None where a part of it is unknown or the units differ."""
     parts = _OPERATOR.split(source.strip())
     signed = parts[1:] if not parts[0] else ["+", *parts]
@@ -63,10 +63,10 @@ def _derived(table: Table, source: str, place: int) -> Column | None:
         return None
     values = sum(values * _scale(own, unit) for values, own, _ in columns)
     array = np.broadcast_to(np.asarray(values, dtype=np.float64), (lengths.pop(),))
-    return Column(source, array, unit, group=groups.pop(), number=place, source=source)
+    return FileColumn(source, array, unit, group=groups.pop(), number=place, source=source)
 
 
-def fault_of(table: Table, source: str) -> str:
+def fault_of(table: ColumnTable, source: str) -> str:
     """Why an expression is no column of a table."""
     names = [name for name in _OPERATOR.split(source.strip())[::2] if name]
     found = {name: table.column(name) for name in names if number(name, ".") is None}
@@ -79,8 +79,8 @@ def fault_of(table: Table, source: str) -> str:
 
 
 def _term(
-    table: Table, is_negative: bool, factors: list[str]
-) -> tuple[Array | float, str, list[Column]] | None:
+    table: ColumnTable, is_negative: bool, factors: list[str]
+) -> tuple[Array | float, str, list[FileColumn]] | None:
     """Product of columns, constants of the file and numbers; its unit, and its columns."""
     columns, values = [], []
     for text in factors:

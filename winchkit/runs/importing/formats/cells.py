@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.runs.importing.table import Column
+from winchkit.runs.importing.table import FileColumn
 from winchkit.runs.importing.unit_spelling import SpelledUnit, read_unit
 
 _MISSING = {
@@ -93,7 +93,7 @@ def has_unit(cell: str, decimal: str) -> bool:
     return _read_quantity(cell, decimal) is not None
 
 
-def with_cell_units(column: Column) -> Column:
+def with_cell_units(column: FileColumn) -> FileColumn:
     """A column of text whose cells have units as one of numbers; another one unchanged.
 
     Returns: in the most frequent unit of the cells. Cells with another text are in ``wrong``.
@@ -107,7 +107,7 @@ def with_cell_units(column: Column) -> Column:
     return column
 
 
-def _converted(column: Column, texts: Sequence[str], decimal: str) -> Column | None:
+def _converted(column: FileColumn, texts: Sequence[str], decimal: str) -> FileColumn | None:
     given = [row for row, text in enumerate(texts) if not is_missing(text)]
     if not given or _read_quantity(texts[given[0]], decimal) is None:
         return None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.names import meaning_of
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 
 _VALUE = re.compile(
@@ -36,13 +36,13 @@ _ROWS = 10
 class _Parts:
     """Columns of a table by their role."""
 
-    key: Column
-    value: Column
-    clocks: tuple[Column, ...]
-    unit: Column | None
+    key: FileColumn
+    value: FileColumn
+    clocks: tuple[FileColumn, ...]
+    unit: FileColumn | None
 
 
-def by_channel(table: Table) -> Table:
+def by_channel(table: ColumnTable) -> ColumnTable:
     """A table with one column for each channel, where each row is one value of one channel.
 
     Returns: values and stamps of each channel in a group of its own, in the order of the file; the
@@ -79,7 +79,7 @@ def _common_start(names: Sequence[str]) -> int:
     return device.end() if device else 0
 
 
-def _parts(table: Table) -> _Parts | None:
+def _parts(table: ColumnTable) -> _Parts | None:
     """Roles of the columns; None for a table of another form."""
     if len({item.group for item in table.columns}) > 1:
         return None
@@ -111,11 +111,11 @@ def _parts(table: Table) -> _Parts | None:
     return None
 
 
-def _is_stamped(column: Column) -> bool:
+def _is_stamped(column: FileColumn) -> bool:
     return is_stamp(next((text for text in column.texts or () if text.strip()), ""))
 
 
-def _without_limits(stamps: Sequence[Column]) -> list[Column]:
+def _without_limits(stamps: Sequence[FileColumn]) -> list[FileColumn]:
     """Columns of stamps without those of a moment that all rows have, as a query's start."""
     found = [set(item.texts or ()) for item in stamps]
     kept = [
@@ -126,13 +126,13 @@ def _without_limits(stamps: Sequence[Column]) -> list[Column]:
     return kept or list(stamps)
 
 
-def _is_increasing(column: Column, codes: NDArray[np.intp]) -> bool:
+def _is_increasing(column: FileColumn, codes: NDArray[np.intp]) -> bool:
     """Whether numbers never decrease within any channel, as only times do."""
     channels = [column.values[codes == code] for code in np.unique(codes)]
     return all(bool(np.all(np.diff(values) >= 0)) for values in channels)
 
 
-def _is_constant(column: Column, codes: NDArray[np.intp]) -> bool:
+def _is_constant(column: FileColumn, codes: NDArray[np.intp]) -> bool:
     """Whether numbers do not change within any channel: a table's number, a quality code."""
     for code in np.unique(codes):
         known = column.values[codes == code]
@@ -142,7 +142,7 @@ def _is_constant(column: Column, codes: NDArray[np.intp]) -> bool:
     return True
 
 
-def _is_of_any_quantity(value: Column, names: Sequence[str]) -> bool:
+def _is_of_any_quantity(value: FileColumn, names: Sequence[str]) -> bool:
     """Whether the channels, and not the column of the values, have the names of quantities.
 
     A file without names needs a channel whose name is known.
@@ -153,7 +153,9 @@ def _is_of_any_quantity(value: Column, names: Sequence[str]) -> bool:
     return is_unnamed and any(meaning_of(split_unit(name)[0]) is not None for name in names)
 
 
-def _columns(parts: _Parts, channel: str, rows: NDArray[np.intp], start: int) -> Iterator[Column]:
+def _columns(
+    parts: _Parts, channel: str, rows: NDArray[np.intp], start: int
+) -> Iterator[FileColumn]:
     """Stamps and values of one channel, whose name begins with what all have in common."""
     name, unit = split_unit(channel[start:])
     if parts.unit is not None and parts.unit.texts is not None:

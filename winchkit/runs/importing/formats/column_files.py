@@ -11,7 +11,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
-from winchkit.runs.importing.table import Table, refuse_size
+from winchkit.runs.importing.table import ColumnTable, refuse_size
 from winchkit.runs.importing.unit_spelling import split_unit
 
 _OBJECTS = (
@@ -20,7 +20,7 @@ _OBJECTS = (
 )
 
 
-def read_numpy(path: str, data: bytes) -> Table:
+def read_numpy(path: str, data: bytes) -> ColumnTable:
     """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code.
 
     Returns: an array of an NPY file is called ``array``; the fields of a structured one have names.
@@ -48,7 +48,7 @@ def read_numpy(path: str, data: bytes) -> Table:
     )
 
 
-def read_parquet(path: str, data: bytes) -> Table:
+def read_parquet(path: str, data: bytes) -> ColumnTable:
     """Read Parquet; units are in the columns' names or metadata (``unit``).
 
     Returns: a column per column of numbers or dates. Raises UsageError without pyarrow; RunError

@@ -17,7 +17,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.fields import fields_of
 from winchkit.runs.importing.formats.variables import table_of_arrays
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.unit_spelling import split_unit
 
 _DEEPEST = 6
@@ -32,7 +32,7 @@ def is_json(data: bytes) -> bool:
     return start.startswith(b"{") or (start[:1] == b"[" and start[1:].lstrip()[:1] in b"[{")
 
 
-def read_json(path: str, data: bytes) -> Table | None:
+def read_json(path: str, data: bytes) -> ColumnTable | None:
     """Read JSON, or JSON Lines (a value on every line).
 
     Returns: None for a text that is no JSON. Raises RunError for JSON without a list of numbers,

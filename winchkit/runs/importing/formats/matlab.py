@@ -18,7 +18,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
-from winchkit.runs.importing.table import Table, refuse_size
+from winchkit.runs.importing.table import ColumnTable, refuse_size
 
 _DEEPEST = 8
 """Nesting of structures that is read; those of Simulink have up to five levels."""
@@ -27,7 +27,7 @@ _HEADER, _COMPRESSED = 128, 15
 _CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat', 't', 'x')"
 
 
-def read_mat(path: str, data: bytes) -> Table:
+def read_mat(path: str, data: bytes) -> ColumnTable:
     """Read a MAT file of version 4 to 7.
 
     Raises RunError for an invalid file.
@@ -107,7 +107,7 @@ def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
         yield name, value
 
 
-def read_hdf5(path: str, data: bytes) -> Table:
+def read_hdf5(path: str, data: bytes) -> ColumnTable:
     """Read an HDF5 file, or a MAT file of version 7.3.
 
     Returns: every dataset of numbers by its path; attributes ``unit`` or ``units`` are units. Links

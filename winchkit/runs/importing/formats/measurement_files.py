@@ -17,14 +17,14 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, WinchkitError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import column_of
-from winchkit.runs.importing.table import Column, Table, named_apart, refuse_size
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart, refuse_size
 
 _NUMBERS = "fiub"
 """Kinds of arrays (NumPy) that hold numbers or truth values."""
 _TIMES = "mM"
 
 
-def read_mdf(path: str, data: bytes) -> Table:
+def read_mdf(path: str, data: bytes) -> ColumnTable:
     """Read an MDF file of version 3 or 4, in physical units.
 
     Returns: a column per channel of numbers; channels of one channel group have one time. Samples
@@ -33,7 +33,7 @@ def read_mdf(path: str, data: bytes) -> Table:
     """
     asammdf = library("asammdf", f"{path}: MDF")
     notes: list[str] = []
-    columns: list[Column] = []
+    columns: list[FileColumn] = []
     version = comment = failure = ""
     with _failing_destructors():
         try:
@@ -71,7 +71,7 @@ def _failing_destructors() -> Iterator[None]:
         sys.unraisablehook = hook
 
 
-def _channels(file: Any, notes: list[str]) -> Iterator[Column]:
+def _channels(file: Any, notes: list[str]) -> Iterator[FileColumn]:
     """The channels of numbers of an MDF file, each group's time before its first one."""
     timed: set[int] = set()
     for signal in file.iter_channels(skip_master=True):
@@ -86,14 +86,14 @@ def _channels(file: Any, notes: list[str]) -> Iterator[Column]:
         if group not in timed:
             timed.add(group)
             stamps = np.asarray(signal.timestamps, dtype=np.float64)
-            yield Column("time", stamps, "s", (named,), group=named)
+            yield FileColumn("time", stamps, "s", (named,), group=named)
         numbers = values.astype(np.float64)
         if signal.invalidation_bits is not None:
             numbers[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-        yield Column(signal.name, numbers, signal.unit or "", (named,), group=named)
+        yield FileColumn(signal.name, numbers, signal.unit or "", (named,), group=named)
 
 
-def read_tdms(path: str, data: bytes) -> Table:
+def read_tdms(path: str, data: bytes) -> ColumnTable:
     """Read a TDMS file of LabVIEW, with scaled values.
 
     Returns: a column per channel of numbers or time stamps. Channels that are waveforms have the
@@ -114,7 +114,7 @@ def read_tdms(path: str, data: bytes) -> Table:
     return _table(path, "TDMS", columns, metadata, notes)
 
 
-def _of_group(group: Any, notes: list[str]) -> Iterator[Column]:
+def _of_group(group: Any, notes: list[str]) -> Iterator[FileColumn]:
     """The channels of a group; channels of another length or increment are a group of their own."""
     several = len({_timing(channel) for channel in group.channels() if len(channel)}) > 1
     timed: set[tuple[int, float, float]] = set()
@@ -129,11 +129,11 @@ def _of_group(group: Any, notes: list[str]) -> Iterator[Column]:
         own = f"{group.name} ({count} samples, {increment:g} s)" if several else group.name
         if increment > 0 and timing not in timed:
             timed.add(timing)
-            yield Column("time", _waveform(timing), "s", (own,), group=own)
+            yield FileColumn("time", _waveform(timing), "s", (own,), group=own)
         properties = channel.properties
         unit = properties.get("unit_string") or properties.get("NI_UnitDescription") or ""
         found = column_of(channel.name, values, str(unit))
-        yield Column(found.name, found.values, found.unit, (own,), group=own)
+        yield FileColumn(found.name, found.values, found.unit, (own,), group=own)
 
 
 def _timing(channel: Any) -> tuple[int, float, float]:
@@ -152,8 +152,8 @@ def _waveform(timing: tuple[int, float, float]) -> Array:
 
 
 def _table(
-    path: str, layout: str, columns: list[Column], metadata: dict[str, str], notes: list[str]
-) -> Table:
+    path: str, layout: str, columns: list[FileColumn], metadata: dict[str, str], notes: list[str]
+) -> ColumnTable:
     if not columns:
         raise RunError(Fault("; ".join(["has no channels with numbers", *notes]), path))
-    return Table(path, layout, named_apart(columns), metadata=metadata, notes=tuple(notes))
+    return ColumnTable(path, layout, named_apart(columns), metadata=metadata, notes=tuple(notes))

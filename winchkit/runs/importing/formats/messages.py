@@ -18,7 +18,7 @@ from winchkit.errors import Fault, RunError, WinchkitError, one_line
 from winchkit.extras import library
 from winchkit.runs.importing.formats.fields import numbers_of, stamp_of
 from winchkit.runs.importing.source_stamps import LOG_TIME, SOURCE_STAMP
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class _Message:
     numbers: dict[str, float]
 
 
-def read_messages(path: str, data: bytes) -> Table:
+def read_messages(path: str, data: bytes) -> ColumnTable:
     """Read an MCAP file.
 
     Returns: columns by topic, in the order of the file, with the log time and the stamp of the
@@ -66,7 +66,7 @@ def read_messages(path: str, data: bytes) -> Table:
     if not columns:
         text = "has no messages with numbers in JSON or ROS 2"
         raise RunError(Fault("; ".join([text, *notes]), path))
-    return Table(path, "MCAP", named_apart(columns), notes=tuple(notes))
+    return ColumnTable(path, "MCAP", named_apart(columns), notes=tuple(notes))
 
 
 def _decoded(path: str, schema: Any, channel: Any, data: bytes, decoders: dict[int, Any]) -> Any:
@@ -81,7 +81,7 @@ def _decoded(path: str, schema: Any, channel: Any, data: bytes, decoders: dict[i
     return decoders[schema.id](data)
 
 
-def _columns(topic: str, found: Sequence[_Message], notes: list[str]) -> Iterator[Column]:
+def _columns(topic: str, found: Sequence[_Message], notes: list[str]) -> Iterator[FileColumn]:
     names = dict.fromkeys(name for item in found for name in item.numbers)
     if not names:
         return
@@ -90,9 +90,9 @@ def _columns(topic: str, found: Sequence[_Message], notes: list[str]) -> Iterato
     if zeros > 1:
         notes.append(f"topic {topic}: {zeros} of {len(found)} stamps are 0; none is used")
     elif len(stamps) == len(found):
-        yield Column(SOURCE_STAMP, np.array(stamps, float), "ns", (topic,), group=topic)
+        yield FileColumn(SOURCE_STAMP, np.array(stamps, float), "ns", (topic,), group=topic)
     times = np.array([item.log_time for item in found], dtype=np.float64)
-    yield Column(LOG_TIME, times, "ns", (topic,), group=topic)
+    yield FileColumn(LOG_TIME, times, "ns", (topic,), group=topic)
     for name in names:
         values = np.array([item.numbers.get(name, np.nan) for item in found], dtype=np.float64)
-        yield Column(name, values, "", (topic,), group=topic)
+        yield FileColumn(name, values, "", (topic,), group=topic)

@@ -14,7 +14,7 @@ from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.dialect import Dialect, decode, split_line
 from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import ColumnTable
 
 _QUALISYS, _TRC = b"NO_OF_FRAMES", b"PathFileType"
 _NAMES = {"MARKER_NAMES", "BODY_NAMES"}
@@ -31,7 +31,7 @@ _POINTS = (
 
 
 @dataclass(frozen=True)
-class _Layout:
+class _CaptureColumns:
     """Names of the columns, and where the rows begin."""
 
     text: str
@@ -50,7 +50,7 @@ class _Layout:
         return len(self.leading) + len(self.bodies) * len(self.names)
 
 
-def read_capture(path: str, data: bytes) -> Table | None:
+def read_capture(path: str, data: bytes) -> ColumnTable | None:
     """Read a text export of motion capture; None for another file."""
     if not data.lstrip(b"\xef\xbb\xbf").startswith((_QUALISYS, _TRC)):
         return None
@@ -73,7 +73,7 @@ def read_capture(path: str, data: bytes) -> Table | None:
     return replace(found, layout=layout.text, notes=notes)
 
 
-def _qualisys(rows: Sequence[Row]) -> _Layout | None:
+def _qualisys(rows: Sequence[Row]) -> _CaptureColumns | None:
     head = rows[:_HEAD]
     keyed = next((n for n, (_, cells) in enumerate(head) if cells[0] in _NAMES), None)
     if keyed is None:
@@ -89,11 +89,11 @@ def _qualisys(rows: Sequence[Row]) -> _Layout | None:
     names = tuple(f"{axis} [mm]" for axis in _AXES) if is_marker else (*_BODY, *_MATRIX)
     if not leading and width == 2 + len(bodies) * len(names):
         leading = ("Frame", "Time [s]")
-    found_layout = _Layout("Qualisys TSV", keyed, first, leading, bodies, names)
+    found_layout = _CaptureColumns("Qualisys TSV", keyed, first, leading, bodies, names)
     return found_layout if found_layout.width == width else None
 
 
-def _trc(rows: Sequence[Row]) -> _Layout | None:
+def _trc(rows: Sequence[Row]) -> _CaptureColumns | None:
     """The third line has the values of the keys of the second, the fourth the markers."""
     if len(rows) < 6:
         return None
@@ -105,7 +105,7 @@ def _trc(rows: Sequence[Row]) -> _Layout | None:
         return None
     unit = given.get("Units", "mm")
     names = tuple(f"{axis} [{unit}]" for axis in _AXES)
-    return _Layout("TRC", 0, first, ("Frame", "Time [s]"), bodies, names)
+    return _CaptureColumns("TRC", 0, first, ("Frame", "Time [s]"), bodies, names)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -118,7 +118,7 @@ def _filled(cells: list[str]) -> list[str]:
     return cells[:-1] if len(cells) > 1 and not cells[-1] else cells
 
 
-def _tracked(rows: Iterable[Row], layout: _Layout) -> Iterable[Row]:
+def _tracked(rows: Iterable[Row], layout: _CaptureColumns) -> Iterable[Row]:
     """Rows of one width; the positions of what is not tracked are NaN."""
     size, start = len(layout.names), len(layout.leading)
     for line, cells in rows:

@@ -16,7 +16,7 @@ from dataclasses import replace
 from itertools import takewhile
 
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
 _NAMES = ("Collection", "Group", "Point")
 """Names before the coordinates; fewer are the last of them."""
@@ -33,7 +33,7 @@ _DISTINCT = 0.9
 """Share of the rows with a name of their own, at least: other texts are remarks or states."""
 
 
-def with_coordinates(table: Table) -> Table:
+def with_coordinates(table: ColumnTable) -> ColumnTable:
     """Names for the columns of a table of points that has none."""
     columns = table.columns
     if any(column.name != str(column.number) for column in columns):
@@ -53,11 +53,11 @@ def with_coordinates(table: Table) -> Table:
     return replace(table, columns=named_apart([*titled, *behind]))
 
 
-def _is_text(column: Column) -> bool:
+def _is_text(column: FileColumn) -> bool:
     return column.texts is not None
 
 
-def names_of_points(table: Table, used: Collection[str]) -> tuple[Sequence[str], ...]:
+def names_of_points(table: ColumnTable, used: Collection[str]) -> tuple[Sequence[str], ...]:
     """Columns that may be the names of points: texts, or numbers below such a title.
 
     ``used``: columns of channels.

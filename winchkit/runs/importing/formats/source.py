@@ -13,12 +13,12 @@ from winchkit.runs.importing.formats.cells import with_cell_units
 from winchkit.runs.importing.formats.channel_table import by_channel
 from winchkit.runs.importing.formats.point_table import with_coordinates
 from winchkit.runs.importing.formats.split_stamps import joined_stamps
-from winchkit.runs.importing.table import LARGEST, Table
+from winchkit.runs.importing.table import LARGEST, ColumnTable
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path) -> ColumnTable:
     """Read a file.
 
     ``path``: text, JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS. Returns: columns in
@@ -31,7 +31,7 @@ def read_table(path: str | Path) -> Table:
     return by_channel(joined_stamps(with_coordinates(units)))
 
 
-def _read(path: str | Path) -> Table:
+def _read(path: str | Path) -> ColumnTable:
     """Columns as they are in the file."""
     name, data = str(path), _content(Path(path))
     if data.startswith(b"PK\x03\x04"):
@@ -53,7 +53,7 @@ def _read(path: str | Path) -> Table:
     return _of_text(name, data)
 
 
-def _of_text(name: str, data: bytes) -> Table:
+def _of_text(name: str, data: bytes) -> ColumnTable:
     """JSON, or rows of text."""
     from winchkit.can_trace import TRACE, is_trace
     from winchkit.runs.importing.formats.json_file import is_json, read_json
@@ -67,7 +67,7 @@ def _of_text(name: str, data: bytes) -> Table:
     return table or read_text_table(name, data)
 
 
-def _of_arrays(name: str, data: bytes) -> Table:
+def _of_arrays(name: str, data: bytes) -> ColumnTable:
     """MAT of version 5 or 7.3, or HDF5, whose signature stands behind a user block."""
     from winchkit.runs.importing.formats.matlab import read_hdf5, read_mat
 
@@ -85,7 +85,7 @@ def _content(path: Path) -> bytes:
     return data
 
 
-def _packed(name: str, data: bytes) -> Table:
+def _packed(name: str, data: bytes) -> ColumnTable:
     try:
         with zipfile.ZipFile(BytesIO(data)) as packed:
             names = packed.namelist()

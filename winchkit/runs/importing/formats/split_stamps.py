@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 
 _FRACTIONS = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3}
 """Seconds of one unit of the fraction."""
@@ -24,7 +24,7 @@ _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _SEPARATORS = " ._-/:"
 
 
-def joined_stamps(table: Table) -> Table:
+def joined_stamps(table: ColumnTable) -> ColumnTable:
     """A table in which a column of whole seconds and one of their fraction are one of seconds.
 
     Returns: the joined column has the place of the seconds; both are named in a note. As a number
@@ -44,7 +44,7 @@ def joined_stamps(table: Table) -> Table:
     return replace(table, columns=tuple(columns), notes=(*table.notes, *notes))
 
 
-def _pairs(table: Table) -> Iterator[tuple[Column, Column, str]]:
+def _pairs(table: ColumnTable) -> Iterator[tuple[FileColumn, FileColumn, str]]:
     """Columns of seconds and of their fraction, with the prefix of its unit."""
     seconds = {
         _place(item, match): item
@@ -62,19 +62,19 @@ def _pairs(table: Table) -> Iterator[tuple[Column, Column, str]]:
             yield whole, item, word
 
 
-def _place(column: Column, match: re.Match[str]) -> tuple[str, tuple[str, ...], int, str]:
+def _place(column: FileColumn, match: re.Match[str]) -> tuple[str, tuple[str, ...], int, str]:
     """What the two columns have in common."""
     stem = match["stem"].rstrip(_SEPARATORS).lower()
     return column.group, column.labels, len(column), stem
 
 
-def _spelled(column: Column) -> str:
+def _spelled(column: FileColumn) -> str:
     """Name and unit as the file has them, without brackets, words of a compound apart."""
     text = f"{column.name} {column.unit}" if column.unit else column.name
     return _CAPITAL.sub(" ", _BRACKETS.sub("", text))
 
 
-def _is_whole(column: Column, limit: float) -> bool:
+def _is_whole(column: FileColumn, limit: float) -> bool:
     """Whether a column has whole numbers from 0 to below a limit."""
     known = column.values[np.isfinite(column.values)]
     if column.texts is not None or not len(known):
@@ -82,7 +82,7 @@ def _is_whole(column: Column, limit: float) -> bool:
     return bool(np.all((known == np.round(known)) & (known >= 0) & (known < limit)))
 
 
-def _joined(whole: Column, part: Column, word: str) -> Column:
+def _joined(whole: FileColumn, part: FileColumn, word: str) -> FileColumn:
     match = _SECONDS.fullmatch(_spelled(whole))
     name = match["stem"].rstrip(_SEPARATORS) if match else ""
     values = whole.values + part.values * _FRACTIONS[word]

@@ -13,10 +13,10 @@ from winchkit.extras import library
 from winchkit.runs.importing.formats.dialect import Dialect, has_cell_units
 from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
-from winchkit.runs.importing.table import Table, named_apart, refuse_size
+from winchkit.runs.importing.table import ColumnTable, named_apart, refuse_size
 
 
-def read_workbook(path: str, data: bytes) -> Table:
+def read_workbook(path: str, data: bytes) -> ColumnTable:
     """Read a workbook.
 
     Returns: cached values of formulas; dates as text in ISO 8601. Raises UsageError without
@@ -55,7 +55,7 @@ def read_workbook(path: str, data: bytes) -> Table:
             for item in table.columns
         ]
     )
-    return Table(
+    return ColumnTable(
         path,
         f"XLSX, sheet {', '.join(tables)}",
         columns,

@@ -24,7 +24,7 @@ from winchkit.runs.importing.formats.dialect import (
 )
 from winchkit.runs.importing.formats.header import KEYS, Header, Row, keyed_width, read_header
 from winchkit.runs.importing.formats.stamps import is_stamp
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
 _AHEAD = 3
 """Rows of numbers after a header that confirm it."""
@@ -42,7 +42,7 @@ _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
 
 
-def read_text_table(path: str, data: bytes) -> Table:
+def read_text_table(path: str, data: bytes) -> ColumnTable:
     """Read a text file.
 
     Raises RunError for a binary file, and for one without rows of numbers.
@@ -117,20 +117,20 @@ class _Cells:
         self.given += given
         self.count += len(cells)
 
-    def column(self, header: Header, index: int) -> Column:
+    def column(self, header: Header, index: int) -> FileColumn:
         """The column of the header's names; without a name where nothing is in it."""
         name, unit = header.names[index], header.units[index]
         if not name and not self.given:
-            return Column("", np.empty(0))
+            return FileColumn("", np.empty(0))
         values = np.concatenate([np.empty(0), *self.pieces])
         name, labels = name or str(index + 1), header.labels[index]
         if self.texts is None and len(self.wrong) > _TEXT_SHARE * self.given:
             texts = [""] * self.count
             for row, text in self.wrong:
                 texts[row] = text
-            return Column(name, values, unit, labels, texts=texts)
+            return FileColumn(name, values, unit, labels, texts=texts)
         wrong = tuple(self.wrong)
-        return Column(name, values, unit, labels, texts=self.texts, wrong=wrong)
+        return FileColumn(name, values, unit, labels, texts=self.texts, wrong=wrong)
 
 
 @dataclass
@@ -157,7 +157,9 @@ class _Rows:
         self.block.clear()
 
 
-def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended: bool) -> Table:
+def table_of_rows(
+    path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended: bool
+) -> ColumnTable:
     """Table of split lines.
 
     ``dialect``: decimal sign and width.
@@ -180,7 +182,7 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
         found.notes.append("the first row of numbers counts the columns and is left out")
     columns = named_apart([c.column(header, n) for n, c in enumerate(found.columns)])
     lines = np.array(found.lines, dtype=np.intp)
-    return Table(
+    return ColumnTable(
         path,
         dialect.text,
         tuple(item for item in columns if item.name),

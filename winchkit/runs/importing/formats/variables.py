@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 
 _WIDEST = 200
@@ -24,13 +24,13 @@ def table_of_arrays(
     units: Mapping[str, str] | None = None,
     metadata: Mapping[str, str] | None = None,
     notes: Sequence[str] = (),
-) -> Table:
+) -> ColumnTable:
     """Table of arrays: vectors and columns of matrices, scalars as constants, texts as metadata.
 
     ``arrays``: variables; matrices have a row or a column per sample, the longer side is time.
     Raises RunError without any array of numbers.
     """
-    columns: list[Column] = []
+    columns: list[FileColumn] = []
     constants: dict[str, float] = {}
     texts = dict(metadata or {})
     left = list(notes)
@@ -44,7 +44,7 @@ def table_of_arrays(
                 texts[name] = str(array)
             elif array.ndim == 1 and array.dtype.kind in "US" and len(array) > 1:
                 cells = [str(item) for item in array]
-                columns.append(Column(name, np.full(len(cells), np.nan), unit, texts=cells))
+                columns.append(FileColumn(name, np.full(len(cells), np.nan), unit, texts=cells))
         elif array.dtype.kind not in "fiubmM":
             left.append(f"variable '{name}' is of type {array.dtype} and left out")
         elif array.ndim == 0:
@@ -61,12 +61,12 @@ def table_of_arrays(
         raise RunError(Fault("has no variables with more than one number", path))
     if len(lengths) > 1:
         columns = [replace(item, group=f"{len(item)} samples") for item in columns]
-    return Table(
+    return ColumnTable(
         path, layout, named_apart(columns), metadata=texts, constants=constants, notes=tuple(left)
     )
 
 
-def column_of(name: str, array: Any, unit: str) -> Column:
+def column_of(name: str, array: Any, unit: str) -> FileColumn:
     """Column of a vector of numbers, or of dates as nanoseconds since 1970.
 
     ``array`` (n,): numbers, dates or durations (``datetime64``, ``timedelta64``). ``unit``: empty
@@ -75,8 +75,8 @@ def column_of(name: str, array: Any, unit: str) -> Column:
     if array.dtype.kind in "mM":
         missing = np.isnat(array)
         whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)
-        return Column(name, np.where(missing, np.nan, whole), "ns")
+        return FileColumn(name, np.where(missing, np.nan, whole), "ns")
     plain, own = (name, unit) if unit else split_unit(name)
     if own and read_unit(own) is not None:
         name, unit = plain, own
-    return Column(name, array.astype(np.float64), unit)
+    return FileColumn(name, array.astype(np.float64), unit)
