@@ -155,7 +155,7 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
         "pulley-coulomb cell-gain",
         "prediction-delay joint-gravity friction-of-load motor-coulomb",
         "spring-balancer stribeck-of-load rotor-inertia",
-        "gear-efficiency torque-constant motor-coulomb torque-lag",
+        "gear-efficiency motor-coulomb torque-constant torque-lag",
         "cable-elongation-linear frame-compliance length-time-offset",
     ],
 )

@@ -12,6 +12,8 @@ from scipy.optimize import brentq
 
 from effect_lines import CATALOGUE, IDS, predict
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
+from winchkit.effects.term import Term, modifiers_of
+from winchkit.model.line import Line
 
 G = 9.80665
 RADIUS, GROWTH, RATIO, DEAD, LENGTH, TURNS = 0.06, 0.006, 20.4, 1.5, 6.0, 4.3
@@ -372,3 +374,13 @@ def test_effect_agrees_with_its_closed_form(effect_id: str) -> None:
     for name, wanted in expected.items():
         assert np.mean(KNOWN) > 0.9
         assert np.allclose(predicted[name][KNOWN], wanted[KNOWN], rtol=1e-10, atol=1e-10), name
+
+
+def test_a_wrong_torque_constant_scales_the_motors_own_torque_as_well() -> None:
+    constant = Term(CATALOGUE["torque-constant"], {"gain_error": 0.05})
+    inertia = Term(CATALOGUE["rotor-inertia"], {"inertia": 2e-3})
+    true, shown = (
+        Line(STANDARD_PROFILE, modifiers_of(terms)).predict(standard_motion())["motor_torque"]
+        for terms in ([inertia], [inertia, constant])
+    )
+    assert np.allclose(shown, 1.05 * true, rtol=1e-12)
