@@ -34,7 +34,8 @@ _COARSE_KNOTS = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
 """Powers of the speed; rule of thumb; varied."""
 _EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
-"""Variables over which the catalogue has every curve already, or that are tried in a product."""
+"""Variables over which the catalogue has every curve already, or that are tried in a product; the
+angle of an axis, which has no cable length, is its position."""
 Law = tuple[Array, int]
 """Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
 _ChangeByCurve = Callable[[Recording, Array, Array], Array]
@@ -82,10 +83,14 @@ def curves(
         variables_of(recording) | {"direction": recording.smooth.at.direction}
         for recording in recordings
     ]
+    position = "cable_length" if "cable_length" in known[0] else "motor_angle"
     names = [
-        n for n in known[0] if n not in _EXCLUDED_VARIABLES and all(n in other for other in known)
+        name
+        for name in known[0]
+        if (name == position or name not in _EXCLUDED_VARIABLES)
+        and all(name in other for other in known)
     ]
-    for factor, name in (*((None, n) for n in names), *_products(names)):
+    for factor, name in (*((None, n) for n in names), *_products(names, position)):
         variable = name if factor is None else f"{factor} times {name}"
         if only is not None and not any((place, variable) in only for place in PLACES):
             continue
@@ -108,14 +113,14 @@ def curves(
                 yield CurveFamily(place, variable, laws, knots, basis)
 
 
-def _products(names: Sequence[str]) -> list[tuple[str, str]]:
-    """Products of a factor and a curve: friction by length or load, compliant cables.
+def _products(names: Sequence[str], position: str) -> list[tuple[str, str]]:
+    """Products of a factor and a curve: friction by place or load, compliant cables.
 
     The direction is the expected one of the model: how steep it is, is not tested.
     """
     force = "load" if "load" in names else "tension"
     pairs = (
-        ("direction", "cable_length"),
+        ("direction", position),
         ("direction", force),
         (force, "cable_length"),
         ("cable_length", force),

@@ -119,7 +119,7 @@ def command(
             station.clock.sleep(REFRESH)
     if dry_run:
         return
-    tell(held, _lines(held))
+    tell(held, _lines(held, forces))
     _require_reached(held)
 
 
@@ -134,12 +134,18 @@ def _preload(text: str) -> float | dict[str, float]:
     return forces if "=" in text else forces[""]
 
 
-def _lines(held: Mapping[str, Any]) -> Iterator[str]:
+def _lines(held: Mapping[str, Any], asked: float | Mapping[str, float] | None) -> Iterator[str]:
     """What is held, for a terminal."""
-    for name, force in (held["force"] or {}).items():
+    force = held["force"] or {}
+    if isinstance(asked, float) and any(abs(one - asked) > 0.5 for one in force.values()):
+        yield (
+            f"{asked:g} N in every cable would move the platform here; set are the forces "
+            "nearest to that which balance its weight"
+        )
+    for name, one in force.items():
         measured, missing = held["measured"][name], held["missing"][name]
         shown = "no reading" if measured is None else f"{measured:.1f} N"
-        yield f"{name}: {shown}, set {force:.1f} N, {missing:+.1f} N are missing that can be given"
+        yield f"{name}: {shown}, set {one:.1f} N, {missing:+.1f} N are missing that can be given"
     if held["position_error"] is not None:
         yield (
             f"platform: {held['position_error'] * 1e3:.3f} mm and "
