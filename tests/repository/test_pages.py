@@ -69,9 +69,9 @@ NOT_RUN = {
     "tests/devices/test_makers_drives.py runs it with the maker's file": "docs/howto/drive.md",
     "needs a bench with a robot": "docs/howto/robot-motion.md",
     "simulates minutes of motion, and needs a bench": "docs/howto/tracker.md",
+    "simulates minutes of a robot's motion": "docs/howto/robot-motion.md",
     "needs a folder of runs over months": "docs/howto/fleet.md",
     "the checks of .ci/run": "CONTRIBUTING.md",
-    "changes the changelog": "docs/release.md",
     "needs a CAN adapter of this computer": "docs/tutorial/bench.md",
     "tests/repository/test_wheel.py installs the wheel": "docs/howto/install.md",
 }

@@ -113,7 +113,8 @@ def _with_transitions(
     """Result of the search, and engine and catalogue where reversals of friction are rounded.
 
     As soon as a friction that was found fits better with a transition, the search begins again with
-    it in every law of friction. It ends where ``is_enough``.
+    it in every law of friction; its result is left where it has more effects and predicts no
+    better. It ends where ``is_enough``.
     """
     transitions: dict[str, float] = {}
 
@@ -131,7 +132,12 @@ def _with_transitions(
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial, again.delays_wait = trials, engine.delays_wait
     again.on_step = lambda present, noise: is_enough(present)
-    return stepwise_selection(again), (again, rounded)
+    found = stepwise_selection(again)
+    if _has_more(found.final, result.final) and not predicts_better(
+        (again, found.final, found.noise), (engine, result.final, result.noise)
+    ):
+        return result, None
+    return found, (again, rounded)
 
 
 def _with_delays_last(
@@ -161,7 +167,7 @@ def _with_delays_last(
         return engine, result
     other, catalogue = rounded or (other, catalogue)
     found = _simplified(other, found)
-    if not _takes_place(engine, result, found):
+    if not _takes_place(engine, result, found, result.initial_model):
         return engine, result
     final, noise = with_delays(other, found.final, found.noise)
     return other, replace(found, final=final, noise=noise, scores=result.scores, tried=result.tried)
@@ -173,18 +179,21 @@ def _has_more(fitted: Fit, other: Fit) -> bool:
 
 
 def _takes_place(
-    engine: TimeSeriesSelection, result: SelectionResult, other: SelectionResult
+    engine: TimeSeriesSelection, result: SelectionResult, other: SelectionResult, without: Fit
 ) -> bool:
-    """Whether another result has no more effects than a result and explains nine tenths as much."""
+    """Whether another result has no more effects than a result and explains nine tenths as much.
+
+    ``without``: the model from which on it is counted what they explain.
+    """
     if _has_more(other.final, result.final):
         return False
     regression = engine.regression
     before, now, then = (
         held_out_rms(regression, fitted, result.noise, regression.blocks)
-        for fitted in (result.initial_model, result.final, other.final)
+        for fitted in (without, result.final, other.final)
     )
     return all(
-        then[name] ** 2 - now[name] ** 2 <= CERTAIN * (before[name] ** 2 - now[name] ** 2)
+        then[name] ** 2 - now[name] ** 2 <= CERTAIN * max(0.0, before[name] ** 2 - now[name] ** 2)
         for name in now
     )
 
@@ -196,7 +205,7 @@ def _with_plain_laws(
 
     A law with a degenerate shape may imitate another effect: presliding over a whole turn is a
     spring. A model of no more effects without such laws takes its place where it explains nine
-    tenths as much.
+    tenths of what they explain.
     """
     plain = _simplified(engine, result)
     degenerate = degenerate_laws(engine, plain.final, plain.noise)
@@ -206,7 +215,12 @@ def _with_plain_laws(
     again = selection_engine(engine.regression.dataset, catalogue, others)
     again.on_trial = engine.on_trial
     found = _simplified(again, stepwise_selection(again))
-    return (again, found) if _takes_place(engine, plain, found) else (engine, plain)
+    hypothesis = plain.final.hypothesis
+    for index in reversed(range(engine.n_initial_terms, len(hypothesis.terms))):
+        if hypothesis.terms[index].effect.id in degenerate:
+            hypothesis = hypothesis.without(index)
+    without = engine.refit(hypothesis, plain.noise)
+    return (again, found) if _takes_place(engine, plain, found, without) else (engine, plain)
 
 
 def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
