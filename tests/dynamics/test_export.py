@@ -7,6 +7,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from simulated_profiles import AXIS, MASS, WINCH, profile_of, torque_run
 from winchkit import forward, load_catalogue
 from winchkit.dynamics.c_code import as_json, c_header, identifier
 from winchkit.dynamics.mjcf import mjcf
+from winchkit.dynamics.python_code import python_module
 from winchkit.dynamics.step import INPUTS, OUTPUTS
 from winchkit.effects import Effect, Values
 from winchkit.effects.bind import terms_of
@@ -235,6 +237,41 @@ def test_a_user_effect_is_exported_or_refused_with_the_template(tmp_path: Path) 
     assert "sin" in c_header(machine(tmp_path), [used(mine)])
     with pytest.raises(UsageError, match="fill in"):
         c_header(machine(tmp_path), [used(replace(base, id="mine", apply=branching))])
+
+
+def by_python(
+    profile: WinchProfile, terms: list[Term], states: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Outputs of the Python module, called once for each state."""
+    space: dict[str, Any] = {}
+    exec(python_module(profile, terms), space)
+    step = space[identifier(profile.name).title().replace("_", "")]()
+    return np.array([np.atleast_1d(step(*row)) for row in states.tolist()])
+
+
+@pytest.mark.parametrize("drum", ROOMS)
+def test_the_python_module_is_the_line(tmp_path: Path, drum: str) -> None:
+    profile = machine(tmp_path, drum)
+    terms = [used(e) for e in EFFECTS.values() if e.id not in REFUSED | BETWEEN]
+    states = random_states(400, 9)
+    found = by_python(profile, terms, states)
+    assert np.max(differences(found, predicted(profile, terms, states))) < 1e-12
+
+
+def test_an_axis_adds_its_effects_to_the_torque_of_ones_own_model(tmp_path: Path) -> None:
+    """Friction in proportion to the load is that of the model's torque."""
+    profile = profile_of(tmp_path, 'schema = 1\nkind = "axis"\nname = "my joint"\n')
+    terms = [Term(EFFECTS["friction-of-load"], {"share": 0.12, "transition": 0.0}),
+             Term(EFFECTS["motor-dahl"], {"torque": 0.4, "distance": 0.02, "start": 0.0,
+                                          "transition": 0.0})]  # fmt: skip
+    states = random_states(300, 10)
+    model, rate = states[:, 4], states[:, 2]
+    found = by_python(profile, terms, states)[:, 0]
+    coulomb = by_python(profile, terms[:1], states)[:, 0]
+    expected = model + 0.12 * np.abs(model) * np.tanh(rate / 0.5)
+    assert coulomb == pytest.approx(expected, rel=1e-12)
+    assert np.max(np.abs(found - coulomb)) == pytest.approx(0.4, rel=1e-3)
+    assert "predicted_torque" in c_header(profile, terms)
 
 
 def test_the_json_has_every_formula(tmp_path: Path) -> None:

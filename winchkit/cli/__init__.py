@@ -119,7 +119,7 @@ SECTIONS: dict[str, dict[str, CommandPlace]] = {
             "winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."
         ),
         "export-model": CommandPlace(
-            "winchkit.cli.files.export_model", "Write a profile as C, for MuJoCo, or as JSON."
+            "winchkit.cli.files.export_model", "Write a profile as C, Python, MuJoCo or JSON."
         ),
         "sim": CommandPlace("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": CommandPlace(

@@ -7,12 +7,20 @@ defined before the header is included.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isinf, isnan
 
 from winchkit.dynamics.expression import Expression, Operation, ordered, statements
-from winchkit.dynamics.step import BEFORE, INPUTS, OUTPUTS, LineSample, step_of
+from winchkit.dynamics.step import (
+    BEFORE,
+    OUTPUTS,
+    LineSample,
+    inputs_of,
+    outputs_of,
+    step_of,
+)
 from winchkit.effects.term import Term
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 _HEAD = """\
@@ -34,7 +42,8 @@ typedef double {p}_real;
 #endif
 
 """
-_FOOT = """\
+_STEP = """\
+
 static inline void {p}_start({p}_state *state)
 {{
     state->is_started = 0;
@@ -57,6 +66,8 @@ static inline void {p}_batch({p}_state *state, const {p}_input *inputs, {p}_outp
         {p}_step(state, &inputs[i], &outputs[i]);
 }}
 
+"""
+_AT_REST = """\
 /* At rest, without memory: length (m) and arm (m/rad) at a motor angle (rad) and a load (N). */
 static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *length, {p}_real *arm)
 {{
@@ -75,7 +86,6 @@ static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
     return angle;
 }}
 
-#endif
 """
 
 
@@ -88,22 +98,27 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
     for c in step.constants:
         value = _literal(c.value, p)
         out.append(f"#define {p.upper()}_{c.name.upper()} {value} /* {c.unit}; {c.source} */\n")
-    out += [_struct(p, "input", INPUTS), _struct(p, "output", OUTPUTS)]
+    inputs = inputs_of(profile)
+    members = {name: told for name, *told in inputs.values()}
+    out += [_struct(p, "input", members), _struct(p, "output", outputs_of(profile))]
     memory = {m.name: ("1", "memory of the effect") for m in step.memories}
     state = _struct(p, "state", memory).replace(
         "{\n", f"{{\n    int is_started;\n    {p}_input before;\n", 1
     )
     out.append(state)
     starts = "".join(f"    state->{m.name} = {_literal(m.start, p)};\n" for m in step.memories)
-    names = {n: f"input->{n}" for n in INPUTS} | {BEFORE + n: f"state->before.{n}" for n in INPUTS}
+    names = {symbol: f"input->{name}" for symbol, (name, *_) in inputs.items()}
+    names |= {BEFORE + n: f"state->before.{name}" for n, (name, *_) in inputs.items()}
     names |= {m.name: f"state->{m.name}" for m in step.memories}
     targets = [f"output->{n}" for n in step.outputs] + [f"state->{m.name}" for m in step.memories]
     roots = [*step.outputs.values(), *(m.after for m in step.memories)]
     body = _body(step, p, roots, targets, names)
-    rest = _body(step, p, step.at_rest, ["*length", "*arm"], {})
-    nominal = _body(step, p, [step.nominal_angle], [f"{p}_real angle"], {})
-    out.append(_FOOT.format(**fields, starts=starts, body=body, rest=rest, nominal=nominal))
-    return "".join(out)
+    out.append(_STEP.format(**fields, starts=starts, body=body))
+    if not isinstance(profile, AxisProfile):
+        rest = _body(step, p, step.at_rest, ["*length", "*arm"], {})
+        nominal = _body(step, p, [step.nominal_angle], [f"{p}_real angle"], {})
+        out.append(_AT_REST.format(**fields, rest=rest, nominal=nominal))
+    return "".join([*out, "#endif\n"])
 
 
 def identifier(name: str) -> str:
@@ -112,7 +127,7 @@ def identifier(name: str) -> str:
     return found if found[:1].isalpha() else f"model_{found}"
 
 
-def _struct(p: str, kind: str, members: dict[str, tuple[str, str]]) -> str:
+def _struct(p: str, kind: str, members: Mapping[str, Sequence[str]]) -> str:
     lines = "".join(
         f"    {p}_real {name}; /* {unit}, {text} */\n" for name, (unit, text) in members.items()
     )
@@ -149,11 +164,13 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
     """The same step as plain data: constants, and assignments ``[name, operation, arguments]``."""
     step = step_of(profile, terms)
     roots = [*step.outputs.values(), *(m.after for m in step.memories)]
-    names = {id(x): "" for x in roots}
+    names, inputs = {id(x): "" for x in roots}, inputs_of(profile)
+    own = {BEFORE * past + n: BEFORE * past + name
+           for n, (name, *_) in inputs.items() for past in (0, 1)}  # fmt: skip
     assignments: list[list[object]] = []
     for x in ordered(roots):
         if not x.arguments:
-            names[id(x)] = x.name or repr(x.value)
+            names[id(x)] = own.get(x.name, x.name) or repr(x.value)
             continue
         names[id(x)] = f"t{len(assignments)}"
         arguments = [names[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
@@ -161,7 +178,7 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
     return {
         "schema": 1,
         "profile": profile.name,
-        "inputs": {n: {"unit": u, "what": w} for n, (u, w) in INPUTS.items()},
+        "inputs": {n: {"unit": u, "what": w} for n, u, w in inputs.values()},
         "before": f"the same of the sample before, with the prefix {BEFORE}",
         "constants": {c.name: {"value": c.value, "unit": c.unit, "source": c.source}
                       for c in step.constants},

@@ -1,4 +1,4 @@
-"""A profile for other programs: C, a model of MuJoCo, or formulas."""
+"""A profile for other programs: C, Python, a model of MuJoCo, or formulas."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Literal
 from winchkit.arguments import require_type
 from winchkit.dynamics.c_code import as_json, c_header
 from winchkit.dynamics.mjcf import mjcf
+from winchkit.dynamics.python_code import python_module
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
@@ -26,7 +27,7 @@ class ExportedModel:
 
 def export_model(
     profile: WinchProfile,
-    to: Literal["c", "mjcf", "json"],
+    to: Literal["c", "python", "mjcf", "json"],
     catalogue: Catalogue | None = None,
     load_mass: float | None = None,
 ) -> ExportedModel:
@@ -36,8 +37,9 @@ def export_model(
     ----------
     profile : WinchProfile
         The winch or the axis.
-    to : {"c", "mjcf", "json"}
-        A header in C99 that needs ``math.h`` only, a model of MuJoCo, or the formulas as JSON.
+    to : {"c", "python", "mjcf", "json"}
+        A header in C99 that needs ``math.h`` only, a Python module that needs ``math`` only, a
+        model of MuJoCo, or the formulas as JSON.
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional
@@ -51,17 +53,19 @@ def export_model(
     Raises
     ------
     UsageError
-        For an unknown form, effects that have no formula of one sample (C and JSON), and a profile
+        For an unknown form, effects that have no formula of one sample (not MuJoCo), and a profile
         without masses (MuJoCo).
     """
     require_type(profile, WinchProfile, "profile")
     terms = terms_of(profile, catalogue)
     if to == "c":
         return ExportedModel(c_header(profile, terms))
+    if to == "python":
+        return ExportedModel(python_module(profile, terms))
     if to == "json":
         found = json.dumps(as_json(profile, terms), indent=1, ensure_ascii=False)
         return ExportedModel(f"{found}\n")
     if to == "mjcf":
         text, missing = mjcf(profile, terms, load_mass)
         return ExportedModel(text, tuple(missing))
-    raise UsageError(f"'{to}' is no form of a model; give c, mjcf or json")
+    raise UsageError(f"'{to}' is no form of a model; give c, python, mjcf or json")

@@ -76,23 +76,26 @@ class Operation:
     slopes: Slope
 
 
-def _sign(x: float) -> float:
+def sign(x: float) -> float:
+    """-1, 0 or 1; 0 of NaN."""
     return float((x > 0) - (x < 0))
 
 
-def _over(a: float, b: float) -> float:
+def over(a: float, b: float) -> float:
     """a/b as IEEE 754 has it: branches that are not taken divide by zero."""
     return a / b if b else math.nan if not a or math.isnan(a) else math.copysign(math.inf, a)
 
 
-def _power(a: float, b: float) -> float:
+def power(a: float, b: float) -> float:
+    """a to the b; NaN where that is complex, infinite for a zero with a negative b."""
     try:
         return float(a**b) if a >= 0 or b == int(b) else math.nan
     except ZeroDivisionError:
         return math.inf
 
 
-def _root(x: float) -> float:
+def root(x: float) -> float:
+    """Square root; NaN of negative numbers."""
     return math.sqrt(x) if x >= 0 else math.nan
 
 
@@ -122,13 +125,13 @@ OPERATIONS: Mapping[str, Operation] = {
     ),
     "multiply": Operation(operator.mul, "({} * {})", "({} * {})", lambda x: (x[1], x[0])),
     "divide": Operation(
-        _over,
+        over,
         "over({}, {})",
         "({} / {})",
         lambda x: (number(1) / x[1], number(-1) * x[0] / (x[1] * x[1])),
     ),
     "power": Operation(
-        _power,
+        power,
         "power({}, {})",
         "F(pow)({}, {})",
         lambda x: (
@@ -138,10 +141,10 @@ OPERATIONS: Mapping[str, Operation] = {
     ),
     "negative": Operation(operator.neg, "(-{})", "(-{})", lambda x: (number(-1),)),
     "absolute": Operation(abs, "abs({})", "F(fabs)({})", lambda x: (apply("sign", x[0]),)),
-    "sign": Operation(_sign, "sign({})", "(real)(({0} > 0) - ({0} < 0))", _flat(1)),
+    "sign": Operation(sign, "sign({})", "(real)(({0} > 0) - ({0} < 0))", _flat(1)),
     "floor": Operation(lambda x: float(math.floor(x)), "floor({})", "F(floor)({})", _flat(1)),
     "sqrt": Operation(
-        _root,
+        root,
         "root({})",
         "F(sqrt)({})",
         lambda x: (number(0.5) / apply("sqrt", x[0]),),
@@ -330,10 +333,10 @@ def statements(
 _GLOBALS: dict[str, Any] = {
     **{name: getattr(math, name) for name in OPERATIONS if hasattr(math, name)},
     "floor": lambda x: float(math.floor(x)),
-    "over": _over,
-    "power": _power,
-    "root": _root,
-    "sign": _sign,
+    "over": over,
+    "power": power,
+    "root": root,
+    "sign": sign,
     "nan": math.nan,
     "inf": math.inf,
 }

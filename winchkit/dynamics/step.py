@@ -19,6 +19,7 @@ from winchkit.effects.term import Term, act
 from winchkit.errors import FileError, UsageError
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Modifier
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 INPUTS = {
@@ -37,6 +38,8 @@ OUTPUTS = {
     "motor_torque": ("N m", "predicted"),
     "arm": ("m/rad", "cable wound in per motor angle"),
 }
+PREDICTED = ("predicted_torque", "N m", "of your own model of the axis; 0 without one")
+"""Input of an axis in place of the load, which has the same effect there: name, unit, meaning."""
 BEFORE = "before_"
 """Prefix of the inputs of the sample before."""
 _UNTRACED = (TypeError, ValueError, AttributeError, IndexError, FileError)
@@ -47,6 +50,18 @@ static inline real {name}(real value, const {prefix}_input *at)
     /* fill in: {formula} */
     return value;
 }}"""
+
+
+def inputs_of(profile: WinchProfile) -> dict[str, tuple[str, str, str]]:
+    """Name, unit and meaning of each input by its symbol."""
+    own = {"load": PREDICTED} if isinstance(profile, AxisProfile) else {}
+    return {symbol: own.get(symbol, (symbol, *told)) for symbol, told in INPUTS.items()}
+
+
+def outputs_of(profile: WinchProfile) -> dict[str, tuple[str, str]]:
+    """Units and meaning of the outputs by name: of an axis the torque."""
+    names = ["motor_torque"] if isinstance(profile, AxisProfile) else list(OUTPUTS)
+    return {name: OUTPUTS[name] for name in names}
 
 
 @dataclass(frozen=True)
@@ -136,8 +151,9 @@ def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch")
     at = resting.moments(none, one["motor_angle"], none, one["load"], traced([20.0]))
     length, arm = resting.lengths_and_arms(at)
     nominal = expression(line.nominal_motor_angle(traced([symbol("length")])))
+    shown = {name: outputs[name] for name in outputs_of(profile)}
     return LineSample(
-        outputs, tuple(recorder.memories.values()), tuple(constants.values()),
+        shown, tuple(recorder.memories.values()), tuple(constants.values()),
         (expression(length), expression(arm)), nominal,
     )  # fmt: skip
 

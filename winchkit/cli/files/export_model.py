@@ -18,6 +18,7 @@ from winchkit.cli.core.quantity_type import QuantityType
     cls=ToolCommand,
     examples=(
         "winchkit export-model better.toml --to c -o better.h",
+        "winchkit export-model joint-axis --to python -o joint.py",
         "winchkit export-model joint-axis --to mjcf -o joint.xml",
     ),
 )
@@ -26,8 +27,8 @@ from winchkit.cli.core.quantity_type import QuantityType
     "--to",
     "form",
     required=True,
-    type=click.Choice(["c", "mjcf", "json"]),
-    help="A header in C99, a model of MuJoCo, or the formulas as JSON.",
+    type=click.Choice(["c", "python", "mjcf", "json"]),
+    help="A header in C99, a Python module, a model of MuJoCo, or the formulas as JSON.",
 )
 @click.option(
     "--load-mass",
@@ -39,7 +40,7 @@ from winchkit.cli.core.quantity_type import QuantityType
 def command(
     *,
     profile: str,
-    form: Literal["c", "mjcf", "json"],
+    form: Literal["c", "python", "mjcf", "json"],
     load_mass: str | None,
     effects: Sequence[str],
     output: str | None,
@@ -47,8 +48,9 @@ def command(
     """Write PROFILE for other programs, with its effects as they stand in it.
 
     The header has a step and a batch of cable length, tension and motor torque, with the memory of
-    the effects, and the motor angle at a cable length. It needs math.h only. The MuJoCo model moves
-    like 'winchkit forward'; effects without a counterpart are listed.
+    the effects, and the motor angle at a cable length. Of an axis it has the motor torque, with the
+    torque of your own model as an input. It needs math.h only, the Python module math only. The
+    MuJoCo model moves like 'winchkit forward'; effects without a counterpart are listed.
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
