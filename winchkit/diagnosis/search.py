@@ -214,7 +214,11 @@ def _with_plain_laws(
     others = [effect for effect in catalogue.of_winches() if effect.id not in degenerate]
     again = selection_engine(engine.regression.dataset, catalogue, others)
     again.on_trial = engine.on_trial
-    found = _simplified(again, stepwise_selection(again))
+    again.on_step = lambda present, noise: _has_more(present, plain.final)
+    found = stepwise_selection(again)
+    if _has_more(found.final, plain.final):
+        return engine, plain
+    found = _simplified(again, found)
     hypothesis = plain.final.hypothesis
     for index in reversed(range(engine.n_initial_terms, len(hypothesis.terms))):
         if hypothesis.terms[index].effect.id in degenerate:
