@@ -100,7 +100,7 @@ class CellRate:
 
 @dataclass(frozen=True)
 class CellTare:
-    """A tare or a zero that was set or removed; in the unit of the instrument, None if not told."""
+    """A tare or a zero that was set or removed; in the unit of the instrument, None if not known."""
 
     before: float | None = None
     """Mean reading before."""
@@ -115,6 +115,6 @@ class CellTare:
     removed: float | None = None
     """The host's tare that was removed."""
     host_tare: float | None = None
-    """The host's tare that stands beside one of the device."""
+    """The tare of the host that is in force as well as that of the device."""
     file: str | None = None
     """File that keeps the host's tares."""
