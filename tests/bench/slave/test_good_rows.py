@@ -1,4 +1,4 @@
-"""Rows of the fault table that were good before: they stay good."""
+"""Load cells that fail or read too much, and eight winches that stop in one SYNC."""
 
 from __future__ import annotations
 
@@ -8,50 +8,14 @@ import pytest
 
 from slave import Slave
 from slave.cell import Cell
-from slave.held_key import HeldKey, jogging, observe, since
+from slave.held_key import HeldKey, jogging, observe
 from slave.rig import CYCLE, Rig, bench_text
 from slave.wire import GENERIC
 from winchkit.drivers.reading import Quality
 
-_RAMP, _BRAKE = 628.0, 100.0
-"""6085h of the slave, and what its brake does without torque, rad/s^2."""
-
 
 def rig_of(folder: Path, winches: int = 1) -> Rig:
     return Rig(folder, [Slave.from_file(GENERIC, number + 1) for number in range(winches)])
-
-
-@pytest.mark.parametrize(
-    ("fault", "within", "cause"),
-    [
-        ("tpdo lost", 0.26, "no complete feedback"),
-        ("heartbeat lost", 0.46, "heartbeat is gone"),
-        ("off the bus", 0.46, "heartbeat is gone|no complete feedback"),
-        ("drive fault", 0.02, "fault"),
-        ("mode changed", 0.02, "mode of operation"),
-        ("reboots", 0.05, "restarted"),
-    ],
-)
-def test_a_fault_stops_the_winch_in_time(
-    tmp_path: Path, fault: str, within: float, cause: str
-) -> None:
-    rig = rig_of(tmp_path)
-    rig.write_bench(bench_text(rig.channel, heartbeat="100 ms"))
-    with rig.opened() as bench:
-        key = jogging(rig, bench)
-        start = rig.time
-        rig.slaves[0].inject(fault)
-        rig.wait(2.0)
-        seen = observe(rig, key, start)
-        assert seen.left <= within
-        assert seen.rest <= within + seen.speed / (_BRAKE if fault == "reboots" else _RAMP) + 0.1
-        assert any(word in seen.cause for word in cause.split("|")), seen.cause
-        rig.slaves[0].mend_all()
-        mended = rig.time
-        rig.wait(3.0)
-        assert not since(rig, mended).moved, "it moved again although nobody has reset it"
-        key.release()
-        rig.wait(0.5)
 
 
 @pytest.mark.parametrize(
