@@ -298,18 +298,6 @@ def test_a_question_of_temperature_is_answered_by_the_simulation(
     assert means == pytest.approx([20.0, 35.0], abs=0.5)
 
 
-def test_what_stops_a_programme_keeps_its_log(
-    bench: Bench, live: LiveBench, tmp_path: Path
-) -> None:
-    programme = Programme("cut", (ProgrammeStep(to=2.0, speed=0.2),))
-    stopper = threading.Timer(1.0, bench.stop_now)
-    stopper.start()
-    with pytest.raises(MotionError):
-        run_programme(bench, programme, tmp_path, lambda _step: None)
-    stopper.join()
-    assert len(read_run(tmp_path / "cut-10kg-1.csv")) > 20
-
-
 def test_a_bench_whose_drive_does_not_exist(live: LiveBench) -> None:
     spec: BenchSpec = live.bench_spec
     wiring = spec.winch["A"]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from multicast import free_port
+from sim_process import free_port
 
 pytestmark = [
     pytest.mark.realtime,

@@ -1,8 +1,9 @@
-"""winchkit's commands in processes of their own, and a simulated bench that one of them serves."""
+"""Commands of winchkit in processes of their own, and the simulated bench that they share."""
 
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -38,6 +39,18 @@ def first_line(process: subprocess.Popen[str]) -> str:
     if "ip route add" in reason:
         pytest.skip(f"no route for multicast here: {reason}")
     pytest.fail(reason)
+
+
+def free_port(group: str) -> int:
+    """A port for a bus of one's own; skips the test where this machine has no multicast route."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        port = int(probe.getsockname()[1])
+        try:
+            probe.sendto(b"", (group, port))
+        except OSError as error:
+            pytest.skip(f"no route for multicast here: {error}")
+    return port
 
 
 @contextmanager

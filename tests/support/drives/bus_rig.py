@@ -19,7 +19,7 @@ import can
 from can.interfaces.socketcan import SocketcanBus
 
 from drive_server import HOST, NODE, DriveServer
-from multicast import free_port
+from sim_process import free_port
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.schema.bench import BenchSpec, BusSpec, DeviceRef, LimitSpec, WinchWiring

@@ -9,7 +9,7 @@ from typing import Any
 import can
 import pytest
 
-from multicast import free_port
+from sim_process import free_port
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.interface import _Library
 from winchkit.drivers.clock import MonotonicClock
