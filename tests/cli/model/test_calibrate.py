@@ -270,10 +270,10 @@ def test_poses_come_from_runs_or_a_bench_or_a_simulated_robot(run: Path, tmp_pat
 def test_poses_before_a_trip_are_kept_and_the_command_that_fits_them_is_named(
     tmp_path: Path,
 ) -> None:
-    """A drive goes silent after 28 s of simulated time: some poses are measured by then."""
+    """A drive goes silent after 40 s of simulated time: some poses are measured by then."""
     text = find("sim", "cabtive-robot").read_text().replace('"8 ms"', '"40 ms"')
     sim, new = tmp_path / "robot.toml", tmp_path / "new.toml"
-    fault = '[[fault]]\ntime = "28 s"\ntarget = "3.servo"\nkind = "silence"\n'
+    fault = '[[fault]]\ntime = "40 s"\ntarget = "3.servo"\nkind = "silence"\n'
     sim.write_text(f"{text}\n{fault}")
     stopped = invoke("cabtive", "--sim", sim, "--box", "20 mm", "--turn", "2 deg", "-o", new)
     assert stopped.exit_code == 5, stopped.output
