@@ -13,6 +13,7 @@ from pymodbus.transport import CommParams, CommType, ModbusProtocol
 
 from cell_campaign.device import Device
 from cell_campaign.warp import WarpLoop
+from modbus_peers.faulty_line import crc
 
 Plan = Callable[[int], str]
 """Fault of the next answer of a unit; empty for none."""
@@ -22,16 +23,6 @@ OVERLOAD = (0.1, 0.4)
 """An overload lasts longer than the reading of value and status, s."""
 TURNAROUND = 0.002
 _PORTS = iter(range(10_000, 2**31))
-
-
-def crc(frame: bytes) -> bytes:
-    """CRC-16/MODBUS, bit by bit."""
-    register = 0xFFFF
-    for byte in frame:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ (0xA001 if register & 1 else 0)
-    return register.to_bytes(2, "little")
 
 
 @dataclass

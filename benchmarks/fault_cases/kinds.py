@@ -63,12 +63,16 @@ def _nothing() -> None:
     return
 
 
-def _drive(kind: str) -> Begin:
+def _device(role: str, kind: str) -> Begin:
     def begin(world: World, winch: str) -> Callable[[], None]:
-        world.live.inject(f"{winch}.servo", kind)
-        return partial(world.live.inject, f"{winch}.servo", "recover")
+        world.live.inject(f"{winch}.{role}", kind)
+        return partial(world.live.inject, f"{winch}.{role}", "recover")
 
     return begin
+
+
+_drive = partial(_device, "servo")
+_cell = partial(_device, "cell")
 
 
 def _slave(kind: str, value: Any = None) -> Begin:
@@ -92,14 +96,6 @@ def _restart(*, kept: bool) -> Begin:
             slave.inject("counter begins anew", slave.motion.counts() if kept else 0)
             slave.inject("reboots")
         return partial(slave.mend, "counter begins anew")
-
-    return begin
-
-
-def _cell(kind: str) -> Begin:
-    def begin(world: World, winch: str) -> Callable[[], None]:
-        world.live.inject(f"{winch}.cell", kind)
-        return partial(world.live.inject, f"{winch}.cell", "recover")
 
     return begin
 
@@ -327,6 +323,21 @@ _FORGETFUL_DRIVE = (
 )
 """Drives that restart or lose their set-up, and guarded ones."""
 
+
+def _stale(name: str, begin: Begin, part: str) -> Kind:
+    """A cell from which no reading comes; what changes replies on the line is in simulated time."""
+    return Kind(
+        name,
+        begin,
+        ("cell stale",) if part == "cell" else ("cell stale", "cell"),
+        _CELL_AGE + READING_DELAY,
+        least=0.5,
+        real_time=part == "cell",
+        blocks="cell",
+        part=part,
+    )
+
+
 _ROWS = (
     *_LYING_DRIVE,
     *_FORGETFUL_DRIVE,
@@ -364,24 +375,8 @@ _ROWS = (
         Kind(f"drive fault: {kind}", _drive(kind), ("fault", "state"), least=0.0, part="servo")
         for kind in ("over-current", "over-temperature", "encoder", "following error")
     ),
-    Kind(
-        "cell silent",
-        _cell("silence"),
-        ("cell stale",),
-        _CELL_AGE + READING_DELAY,
-        least=0.5,
-        blocks="cell",
-        part="cell",
-    ),
-    Kind(
-        "cell refuses",
-        _cell("exception"),
-        ("cell stale",),
-        _CELL_AGE + READING_DELAY,
-        least=0.5,
-        blocks="cell",
-        part="cell",
-    ),
+    _stale("cell silent", _cell("silence"), "cell"),
+    _stale("cell refuses", _cell("exception"), "cell"),
     Kind(
         "cell broken", _cell("sensor break"), ("cell", "cell stale"), 0.15, least=0.2, part="cell"
     ),
@@ -389,36 +384,17 @@ _ROWS = (
         "cell overloaded", _cell("overload"), ("cell", "cell stale"), 0.15, least=0.2, part="cell"
     ),
     Kind("cell frozen", _cell("frozen"), ("cell frozen", "frozen"), stops=False, part="cell"),
-    Kind(
+    _stale(
         "cell: wrong unit",
         _reply(lambda data: data[:6] + bytes((data[6] ^ 0x20,)) + data[7:]),
-        ("cell stale", "cell"),
-        _CELL_AGE + READING_DELAY,
-        least=0.5,
-        real_time=False,
-        blocks="cell",
-        part="line",
+        "line",
     ),
-    Kind(
+    _stale(
         "cell: wrong transaction",
         _reply(lambda data: bytes((data[0] ^ 0x55,)) + data[1:]),
-        ("cell stale", "cell"),
-        _CELL_AGE + READING_DELAY,
-        least=0.5,
-        real_time=False,
-        blocks="cell",
-        part="line",
+        "line",
     ),
-    Kind(
-        "cell: short",
-        _reply(lambda data: data[:-3]),
-        ("cell stale", "cell"),
-        _CELL_AGE + READING_DELAY,
-        least=0.5,
-        real_time=False,
-        blocks="cell",
-        part="line",
-    ),
+    _stale("cell: short", _reply(lambda data: data[:-3]), "line"),
     Kind(
         "over-tension",
         _snag(STIFFNESS),

@@ -9,7 +9,7 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from waiting import until
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase
@@ -24,7 +25,6 @@ from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.bench.programme import run_programme
 from winchkit.bench.remote.client import attach
 from winchkit.errors import (
-    DriveFault,
     FileError,
     LimitTripped,
     MotionError,
@@ -59,13 +59,6 @@ def bench(live: LiveBench, clock: PacedClock) -> Iterator[Bench]:
     with open_bench(live.bench_spec, clock) as opened:
         opened.on_cycle(clock.control)
         yield opened
-
-
-def until(condition: Callable[[], bool], within: float = 15.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.005)
 
 
 def test_jog_move_log_and_the_instruments_agree(bench: Bench, tmp_path: Path) -> None:
@@ -163,31 +156,6 @@ def test_what_is_refused(bench: Bench, live: LiveBench) -> None:
         open_bench(live.bench_spec)
 
 
-def test_a_drive_fault_stops_latches_and_is_reset(bench: Bench, live: LiveBench) -> None:
-    winch = bench.winch["A"]
-    winch.move_to(3.0, 0.2, wait=False)
-    until(lambda: abs(winch.snapshot.cable_speed) > 0.1)
-    live.inject("A.servo", "following error")
-    with pytest.raises(DriveFault, match="8611h following error"):
-        winch.wait()
-    with pytest.raises(DriveFault, match="latched"):
-        winch.jog(wind_in=0.1)
-    bench.reset()
-    winch.jog(wind_in=0.1, duration=0.2)
-    assert not bench.snapshot.tripped
-
-
-def test_a_reboot_is_commissioned_again_by_a_reset(bench: Bench, live: LiveBench) -> None:
-    winch = bench.winch["A"]
-    live.inject("A.servo", "reboot")
-    until(lambda: any(t.kind in ("boot-up", "nmt") for t in bench.snapshot.tripped))
-    with pytest.raises(LimitTripped, match="reset"):
-        winch.jog(wind_in=0.1)
-    time.sleep(1.0)
-    bench.reset()
-    winch.jog(wind_in=0.1, duration=0.2)
-
-
 def test_a_silent_cell_stops_the_winch(bench: Bench, live: LiveBench) -> None:
     winch = bench.winch["A"]
     winch.move_to(3.0, 0.1, wait=False)
@@ -243,37 +211,6 @@ def test_a_log_of_a_station_that_cannot_go_on_disturbs_no_other(
     assert other is not None
     cycle = other.status()["cycle"]
     until(lambda: other.status()["cycle"] > cycle)
-    other.close()
-
-
-def test_of_two_stations_that_log_onto_one_path_one_is_refused(
-    bench: Bench, tmp_path: Path
-) -> None:
-    """In the owner's process; by another spelling and a symbolic link as well."""
-    path, link = tmp_path / "lift.csv", tmp_path / "link.csv"
-    link.symlink_to(path)
-    station, other = attach(bench.spec), attach(bench.spec)
-    assert station is not None
-    assert other is not None
-    station.start_log(str(path))
-    for name in (path, link, f"{tmp_path}/./lift.csv"):
-        for rotate in (None, "1s"):
-            if rotate and name == link:
-                continue
-            with pytest.raises(UsageError, match=r"another log is being written|holds a log"):
-                other.start_log(str(name), rotate, replace=True)
-    with (
-        pytest.raises(UsageError, match="another log is being written"),
-        bench.log(path, replace=True),
-    ):
-        pytest.fail("it began")
-    until(lambda: station.log_rows() > 10)
-    rows = station.end_log()
-    assert other.end_log() == 0
-    assert len(read_run(path)) == rows
-    with pytest.raises(UsageError, match="contains a log already"):
-        bench.log(path)
-    station.close()
     other.close()
 
 
@@ -359,18 +296,6 @@ def test_a_question_of_temperature_is_answered_by_the_simulation(
     written = run_programme(bench, Programme("warm", steps), tmp_path, live.answer)
     means = [float(np.nanmean(read_run(path)["temperature"])) for path in written]
     assert means == pytest.approx([20.0, 35.0], abs=0.5)
-
-
-def test_what_stops_a_programme_keeps_its_log(
-    bench: Bench, live: LiveBench, tmp_path: Path
-) -> None:
-    programme = Programme("cut", (ProgrammeStep(to=2.0, speed=0.2),))
-    stopper = threading.Timer(1.0, bench.stop_now)
-    stopper.start()
-    with pytest.raises(MotionError):
-        run_programme(bench, programme, tmp_path, lambda _step: None)
-    stopper.join()
-    assert len(read_run(tmp_path / "cut-10kg-1.csv")) > 20
 
 
 def test_a_bench_whose_drive_does_not_exist(live: LiveBench) -> None:

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fake_axis import CYCLE, Rig, StraightLine
-from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Jog, PlannedMove, StartGate
+from winchkit.bench.control.motion import PlannedMove, StartGate
 from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.cia402.state_machine import DriveState
 from winchkit.schema.bench import LimitSpec
@@ -88,8 +87,7 @@ def test_a_common_move_starts_from_winches_that_hold() -> None:
 
 def test_a_winch_that_jogs_comes_to_rest_first() -> None:
     rig = Rig(LIMITS, "AB")
-    jog = Jog(rig.cable("A"), rig.limits, 0.3, DeadMan(rig.now + 10))
-    rig.controller("A").begin(jog)
+    rig.jog(0.3)
     rig.run(0.5)
     begin(rig, {"A": 3.0, "B": 5.0})
     seen = speeds(rig, 8.0)

@@ -126,6 +126,8 @@ def test_a_fault_of_one_is_reported_to_every_waiting_client(live: LiveBench, ben
     with pytest.raises(DriveFault, match="winch D"):
         bench.winch["A"].wait()
     bench.wait_at_rest(NAMES)
+    with pytest.raises(DriveFault, match="latched"):
+        bench.winch["D"].jog(wind_in=0.1)
     bench.reset()
 
 

@@ -283,6 +283,7 @@ def test_scores_of_every_campaign_are_read_from_their_log(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_a_ripple_that_is_sampled_a_few_times_per_period_keeps_its_name(tmp_path: Path) -> None:
     """Two fast runs: the derivatives of the effect are too small there, which is known."""
     case = make_logger_case(26112700321, LoggerPlan(1.0), tmp_path)

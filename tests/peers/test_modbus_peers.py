@@ -6,13 +6,13 @@ import os
 import re
 import shutil
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from served import Served
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
@@ -124,13 +124,6 @@ def bus(server: Path, request: pytest.FixtureRequest) -> Iterator[BusSpec]:
         process.stdout.close()
         if cable:
             cable.close()
-
-
-def until(condition: Callable[[], bool], within: float = 10.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.01)
 
 
 def test_our_reader_reads_and_tares_libmodbus(bus: BusSpec) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ import pytest
 
 from can_bridge import Bridge
 from npm_install import install
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
@@ -81,13 +81,6 @@ class Peer:
         line = self._process.stdout.readline()
         assert line, "the peer has ended"
         return json.loads(line)
-
-
-def until(condition: Callable[[], bool], within: float = 10.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.01)
 
 
 # The peer is the master, our simulated drive the slave.

@@ -109,6 +109,7 @@ def test_nothing_that_a_file_says_steers_the_terminal(tmp_path: Path) -> None:
         ("compare", messages, "-p", PROFILE_FILE),
         ("compare", messages, "-p", PROFILE_FILE, "--winch", "all"),
         ("diagnose", rows, "-p", profile),
+        ("import", rows),
         ("log", "replay", "--fast", "--jsonl", messages),
         ("log", "replay", "--fast", messages),
         ("log", "recover", messages, "-o", tmp_path / f"r{EVIL.replace('/', '')}.mcap"),

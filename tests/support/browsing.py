@@ -1,18 +1,39 @@
-"""The page in Chromium: served processes and opened pages."""
+"""The page in Debian's Chromium, driven by Playwright: served processes and opened pages."""
 
 from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 STARTS = 60.0
 """For a page or a server to start, s."""
+
+
+_PROGRAM = shutil.which("chromium")
+
+NEEDS_CHROMIUM = pytest.mark.skipif(
+    _PROGRAM is None, reason="no Chromium: apt-get install chromium"
+)
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser of Playwright, closed at the end."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=_PROGRAM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
 
 
 class Served:

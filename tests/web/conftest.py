@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from browsing import Served
-from chromium import chromium
+from browsing import Served, chromium
 from stalls import LATE_CYCLES
 from winchkit import find
 

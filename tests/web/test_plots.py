@@ -13,8 +13,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import Served, number, opened, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, Served, number, opened, until
 
 pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 SMALL = """() => [...document.querySelectorAll("button, select, input, a, summary")]

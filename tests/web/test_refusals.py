@@ -12,8 +12,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import Served, opened, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, Served, opened, until
 
 pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 

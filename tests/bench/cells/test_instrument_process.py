@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from busiest_thread import busiest_thread
+from waiting import until
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control import realtime
@@ -56,14 +57,6 @@ def bench(live: LiveBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> I
     monkeypatch.setattr(realtime, "_prioritise", refused)
     with open_bench(live.write_bench_file(tmp_path / "bench.toml"), realtime="try") as opened:
         yield opened
-
-
-def until(condition: Callable[[], bool], within: float = 5.0) -> float:
-    begin = time.monotonic()
-    while not condition():
-        assert time.monotonic() < begin + within, "it did not come to that"
-        time.sleep(0.002)
-    return time.monotonic() - begin
 
 
 def process_of(bench: Bench) -> int:

@@ -7,8 +7,6 @@ import math
 import pytest
 
 from fake_axis import CYCLE, Rig
-from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.snapshot import Phase
 from winchkit.schema.bench import LimitSpec
 
@@ -21,8 +19,7 @@ def jogging(winding_speed: float, length: float = 4.0) -> Rig:
     rig = Rig(LIMITS)
     rig.axes["A"].angle = (4.0 - length) / ARM
     rig.step(2)
-    jog = Jog(rig.cable(), rig.limits, winding_speed, DeadMan(math.inf))
-    rig.controller().begin(jog)
+    rig.jog(winding_speed)
     rig.run(0.3)
     return rig
 

@@ -19,15 +19,9 @@ LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))
 ENERGISING = {0x06, 0x07}
 
 
-def jog(rig: Rig, speed: float, hold: float = DEAD_MAN) -> Jog:
-    source = Jog(rig.cable(), rig.limits, speed, DeadMan(rig.now + hold))
-    rig.controller().begin(source)
-    return source
-
-
 def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
     rig = Rig(LIMITS)
-    jog(rig, 0.1)
+    rig.jog(0.1, DEAD_MAN)
     rig.run(0.15)
     assert rig.speeds[-1] == pytest.approx(0.1)
     rig.run(0.3)
@@ -40,7 +34,7 @@ def test_a_jog_without_refresh_ends_by_itself_and_disables() -> None:
 
 def test_a_refreshed_jog_goes_on_and_its_speed_ramps() -> None:
     rig = Rig(LIMITS)
-    source = jog(rig, 0.3)
+    source = rig.jog(0.3, DEAD_MAN)
     for _ in range(20):
         source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
         rig.run(0.1)
@@ -51,7 +45,7 @@ def test_a_refreshed_jog_goes_on_and_its_speed_ramps() -> None:
 
 def test_a_jog_slows_down_before_a_length_limit() -> None:
     rig = Rig(LimitSpec(0.5, 1.0, (3.8, 9.0)))
-    source = jog(rig, 0.5)
+    source = rig.jog(0.5, DEAD_MAN)
     for _ in range(20):
         source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
         rig.run(0.1)
@@ -125,7 +119,7 @@ def test_a_held_jog_stays_within_its_length_whatever_lag_is_declared(
     limits = LimitSpec(speed, acceleration, (3.0, 5.0), response_time=response)
     rig = Rig(limits)
     rig.axes["A"].lag = lag
-    source = jog(rig, -speed if pays_out else speed)
+    source = rig.jog(-speed if pays_out else speed, DEAD_MAN)
     lengths = []
     for _ in range(round((1.0 / speed + speed / acceleration + 1.0) / 0.1)):
         source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
@@ -195,7 +189,7 @@ def test_a_held_move_stays_enabled_until_stopped() -> None:
 
 def test_a_move_during_a_jog_waits_for_rest_and_no_speed_jumps() -> None:
     rig = Rig(LIMITS)
-    jog(rig, 0.3, hold=1.0)
+    rig.jog(0.3, hold=1.0)
     rig.run(0.5)
     move = PlannedMove(StraightLine(), LIMITS, 4.2)
     rig.controller().begin(move)
@@ -219,7 +213,7 @@ def test_after_a_stop_nothing_energises_whatever_came_before(
     rig = Rig(LIMITS)
     for order, duration in orders:
         if order == "jog":
-            jog(rig, 0.4, hold=0.5)
+            rig.jog(0.4, hold=0.5)
         elif order == "stop":
             rig.controller().stop()
         elif order == "run_down":
@@ -240,7 +234,7 @@ def test_after_a_stop_nothing_energises_whatever_came_before(
 def test_a_run_down_with_stale_feedback_becomes_a_quick_stop(moment: float) -> None:
     """0Fh is repeated during a ramp for five SYNCs without a status word, and then no more."""
     rig = Rig(LIMITS)
-    jog(rig, 0.5, hold=1.0)
+    rig.jog(0.5, hold=1.0)
     rig.run(moment)
     axis = rig.axes["A"]
     axis.alive = False
@@ -262,7 +256,7 @@ def test_a_command_after_a_ramp_that_became_a_quick_stop_waits_for_the_stop(
     The drive receives the quick stop, and its answers are lost for ``late`` cycles more.
     """
     rig = Rig(LIMITS)
-    jog(rig, speed, hold=1.0)
+    rig.jog(speed, hold=1.0)
     rig.run(0.9)
     axis = rig.axes["A"]
     axis.alive = False
@@ -273,7 +267,7 @@ def test_a_command_after_a_ramp_that_became_a_quick_stop_waits_for_the_stop(
     before = len(axis.words)
     length = rig.cable().at(axis.angle)[0]
     if joins:
-        jog(rig, -0.1, hold=30.0)
+        rig.jog(-0.1, hold=30.0)
     else:
         rig.controller().begin(
             PlannedMove(rig.cable(), rig.limits, length=length + 0.05, speed=0.1)
@@ -309,7 +303,7 @@ def test_moves_beyond_the_limits_are_refused(arguments: dict[str, float], words:
 @given(pause=st.floats(0.0, 0.6), order=st.sampled_from(["expire", "stop", "run_down"]))
 def test_a_new_press_moves_again_whenever_it_comes(pause: float, order: str) -> None:
     rig = Rig(LIMITS)
-    jog(rig, 0.1, hold=0.3)
+    rig.jog(0.1, hold=0.3)
     rig.run(0.25)
     if order == "stop":
         rig.controller().stop()
@@ -317,7 +311,7 @@ def test_a_new_press_moves_again_whenever_it_comes(pause: float, order: str) -> 
         rig.controller().run_down()
     rig.run(pause)
     before = rig.axes["A"].angle
-    jog(rig, 0.1, hold=0.7)
+    rig.jog(0.1, hold=0.7)
     rig.run(0.5)
     assert rig.axes["A"].angle - before > 0.1 * 0.2 / 0.005
     rig.run(2.0)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 
 from fake_axis import CYCLE, Rig
-from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Jog
 from winchkit.schema.bench import LimitSpec
 
 _LIMITS = LimitSpec(speed=0.5, acceleration=1.0, length=(3.0, 4.2), response_time=0.06)
@@ -20,17 +18,11 @@ def step(rig: Rig, missed: int = 0) -> None:
     rig.loop.step(rig.now, missed)
 
 
-def jogging(rig: Rig, speed: float) -> Jog:
-    jog = Jog(rig.cable(), _LIMITS, speed, DeadMan(rig.now + 1e3))
-    rig.controller().begin(jog)
-    return jog
-
-
 @pytest.mark.parametrize("every", [0, 2, 3, 5])
 def test_braking_before_a_limit_is_not_later_where_cycles_are_missed(every: int) -> None:
     """Four cycles of five missed, as often as ``every`` says: it rests before the limit of 3 m."""
     rig = Rig(_LIMITS, cell=True)
-    jogging(rig, 0.5)
+    rig.jog(0.5)
     shortest = 4.0
     for number in range(1500):
         step(rig, 4 if every and number % every == 0 else 0)
@@ -46,7 +38,7 @@ def test_a_ramp_goes_on_in_missed_cycles_unless_the_drive_waited(
 ) -> None:
     """A drive that follows positions stands at its last one until the next comes."""
     rig = Rig(_LIMITS, cell=True)
-    jogging(rig, 0.5)
+    rig.jog(0.5)
     rig.axes["A"].position_mode = position_mode
     for _ in range(40):
         step(rig)

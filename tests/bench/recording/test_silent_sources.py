@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 
 from fed import CYCLE, EVERY, angle, recording
+from sim_process import first_line, start
 from winchkit.runs import read_run
 from winchkit.runs.info import info_of, summary_of
 from winchkit.runs.read import read_log
@@ -87,26 +87,13 @@ def test_gaps_count_up_to_both_ends_of_the_log(tmp_path: Path, before: float, af
     assert (sources["/B/temperature"].samples, sources["/B/temperature"].gaps) == (0, 1)
 
 
-WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
-
-
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """A simulated bench that takes lines."""
-    command = [*WINCHKIT, "sim", "serve", "spiral-bench", "--bench-file", "bench.toml"]
-    with subprocess.Popen(
-        command,
-        cwd=tmp_path,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        assert process.stdout is not None
+    words = ("sim", "serve", "spiral-bench", "--bench-file", "bench.toml")
+    with start(*words, stdin=subprocess.PIPE, folder=tmp_path) as process:
         assert process.stdin is not None
-        if not process.stdout.readline():
-            assert process.stderr is not None
-            pytest.skip(f"no multicast here: {process.stderr.read()}")
+        first_line(process)
         yield process
         process.stdin.write("quit\n")
         process.stdin.flush()
@@ -120,13 +107,8 @@ def test_the_command_reports_it_at_once_and_at_the_end(
     served: subprocess.Popen[str], tmp_path: Path, strict: tuple[str, ...], code: int
 ) -> None:
     path = tmp_path / "lift.csv"
-    with subprocess.Popen(
-        [*WINCHKIT, "log", "-b", "bench.toml", "-o", path, "--for", "4s", *strict],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as log:
+    words = ("log", "-b", "bench.toml", "-o", path, "--for", "4s", *strict)
+    with start(*words, folder=tmp_path) as log:
         deadline = time.monotonic() + 30
         while not path.is_file() or len(path.read_text().split("\n")) < 60:
             assert time.monotonic() < deadline, "no log began"

@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,6 +23,8 @@ import pytest
 
 from client_stalls import served as stalls_served
 from client_stalls import stall
+from sim_process import WINCHKIT, served_bench, start
+from waiting import until
 from winchkit import attach, open_bench
 from winchkit.bench.ownership import owner_process
 from winchkit.errors import NotPermitted
@@ -34,18 +36,6 @@ pytestmark = [
     pytest.mark.realtime,
     pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"),
 ]
-
-WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
-
-
-def start(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [*WINCHKIT, *arguments],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
 
 
 def winchkit(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -71,20 +61,9 @@ def relaxed(text: str) -> str:
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A simulated bench in its own process; yields its bench file."""
-    path = tmp_path_factory.mktemp("served") / "bench.toml"
-    with start("sim", "serve", "spiral-bench", "--bench-file", str(path)) as process:
-        assert process.stdout is not None
-        assert process.stderr is not None
-        if not process.stdout.readline():
-            reason = process.stderr.read()
-            if "ip route add" in reason:
-                pytest.skip(f"no route for multicast here: {reason}")
-            pytest.fail(reason)
+    with served_bench(tmp_path_factory.mktemp("served")) as path:
         path.write_text(relaxed(path.read_text()))
         yield path
-        process.send_signal(signal.SIGINT)
-        process.communicate(timeout=20)
-        assert process.returncode == 0
 
 
 def state(served: Path) -> tuple[float, str]:
@@ -117,13 +96,6 @@ def runs(process: int) -> bool:
     except ProcessLookupError:
         return False
     return True
-
-
-def until(condition: Callable[[], bool], what: str, within: float = 90.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.05)
 
 
 @contextmanager
@@ -166,7 +138,7 @@ def until_written(log: Path, logger: subprocess.Popen[str]) -> None:
         return lines() > before + 20
 
     before = lines()
-    until(written, f"no 20 rows came to {log}")
+    until(written, 90, f"no 20 rows came to {log}")
 
 
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
@@ -213,7 +185,7 @@ def test_a_suspended_command_moves_nothing(served: Path, order: tuple[str, ...])
             until_moving(served, client)
             client.send_signal(signal.SIGSTOP)
             stopped = time.monotonic()
-            until(lambda: state(served)[1] != "operation enabled", "it moves on", within=10)
+            until(lambda: state(served)[1] != "operation enabled", 10, "it moves on")
             # The dead-man, the ramp and a busy computer; before, it moved on for 30 s.
             assert time.monotonic() - stopped < 3.0
             assert_stands_still(served)
@@ -232,9 +204,9 @@ def test_a_suspended_command_moves_nothing(served: Path, order: tuple[str, ...])
     assert winchkit("reset", "-b", str(served)).returncode == 0
 
 
-@pytest.mark.parametrize("kind", ["jog", "keys", "hold-tension"])
+@pytest.mark.parametrize("kind", ["keys", "hold-tension"])
 def test_a_client_that_was_suspended_goes_on_with_nothing(tmp_path: Path, kind: str) -> None:
-    """The loop of benchmarks/client_stalls.py, once for each kind."""
+    """The loop of benchmarks/client_stalls.py, once for each kind that is not above."""
     with stalls_served(tmp_path) as bench:
         assert stall(bench, kind, random.Random(7)).wrong == ""
 
@@ -260,7 +232,7 @@ def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) ->
 
 
 def test_one_bench_process_serves_commands_that_start_together(served: Path) -> None:
-    until(lambda: not runs(owner(served)), "the bench process did not end")
+    until(lambda: not runs(owner(served)), 90, "the bench process did not end")
     options = ("-b", str(served), "--json", "--for", "2s")
     with start("monitor", *options) as first, start("monitor", *options) as second:
         told = [process.communicate(timeout=60) for process in (first, second)]
@@ -268,7 +240,7 @@ def test_one_bench_process_serves_commands_that_start_together(served: Path) -> 
     owners = [json.loads(out.splitlines()[-1])["owner"] for out, _ in told]
     assert owners[0] == owners[1]
     assert owners[0].startswith(f"bench process (process {owner(served)}, user ")
-    until(lambda: not runs(owner(served)), "the bench process outlives its last client")
+    until(lambda: not runs(owner(served)), 90, "the bench process outlives its last client")
 
 
 def test_a_second_jog_is_refused_by_name_and_the_first_goes_on(served: Path) -> None:
@@ -303,7 +275,7 @@ def test_a_killed_bench_process_is_missed_by_the_drive_and_reported_to_its_clien
         code, words = ended(jog)
     assert code == 4, words
     assert "the process that owned the bench has ended; its drives stop" in words
-    until(lambda: state(served)[1] != "operation enabled", "it is still enabled", 3.0)
+    until(lambda: state(served)[1] != "operation enabled", 3.0, "it is still enabled")
     assert_stands_still(served)
     assert winchkit("stop", "-b", str(served)).returncode == 0
     again = winchkit("jog", "-b", str(served), "--pay-out", "10mm", "--reset")
@@ -315,9 +287,9 @@ def test_a_killed_client_stops_what_it_started_and_the_bench_process_ends(served
         process = owner(served)
         jog.kill()
         jog.communicate()
-        until(lambda: state(served)[1] != "operation enabled", "it is still enabled", 5.0)
+        until(lambda: state(served)[1] != "operation enabled", 5.0, "it is still enabled")
         assert_stands_still(served)
-    until(lambda: not runs(process), "the bench process outlives its last client")
+    until(lambda: not runs(process), 90, "the bench process outlives its last client")
 
 
 @pytest.mark.parametrize(
@@ -341,7 +313,7 @@ def test_a_signal_to_the_bench_process_stops_and_closes_its_logs(
         os.kill(process, number)
         code, words = ended(jog)
         assert code == 4, words
-        until(lambda: not runs(process), "it did not end")
+        until(lambda: not runs(process), 90, "it did not end")
         assert state(served)[1] != "operation enabled"
         assert log.read_text().endswith("\n"), "the log was closed"
         assert len(read_run(log)) > 10

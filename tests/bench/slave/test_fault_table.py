@@ -19,8 +19,9 @@ from typing import Any
 import pytest
 
 from slave import Slave, State
+from slave.cell import Cell
 from slave.held_key import HeldKey, jogging, observe, since
-from slave.rig import Rig
+from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Trip
@@ -61,13 +62,13 @@ _LEFT = "left operation enabled without a command"
 _ROWS = (
     Row("enable input open", cause=_LEFT, without_torque=True),
     Row("second master disables", cause=_LEFT, without_torque=True),
-    Row("reboots", cause="restarted", without_torque=True),
+    Row("reboots", cause="restarted", without_torque=True, within=0.05),
     Row("reset by a stranger", cause="restarted|left operation|NMT", without_torque=True),
     Row("stopped by a stranger", cause="NMT|" + _LEFT),
     Row("pre-operational by a stranger", cause="pre-operational"),
     Row("goes pre-operational", cause="pre-operational"),
-    Row("drive fault", cause="fault"),
-    Row("mode changed", cause="mode of operation"),
+    Row("drive fault", cause="fault", within=0.02),
+    Row("mode changed", cause="mode of operation", within=0.02),
     Row("sync unheard", cause="no complete feedback"),
     Row("host frames lost", cause="feedback|operational|NMT|left"),
     Row("heartbeat unheard", cause="NMT|operational|" + _LEFT),
@@ -199,6 +200,30 @@ def test_the_dead_man_expires_into_a_fault(tmp_path: Path, fault: str) -> None:
         expires = 0.2
         assert seen.left <= expires + _WITHIN
         assert seen.rest <= expires + _WITHIN + seen.speed / _RAMP + _LAG
+
+
+def test_an_over_tension_stops_winding_in_and_lets_it_out(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    limits = {"tension_high": "200 N"}
+    with rig.opened(bench_text(rig.channel, limits=limits)) as bench:
+        tension = [100.0]
+        Cell(rig, lambda: tension[0]).fit(bench)
+        key = jogging(rig, bench, pay_out=-0.1)
+        start = rig.time
+        tension[0] = 250.0
+        rig.wait(1.0)
+        seen = observe(rig, key, start)
+        assert seen.left <= 0.04
+        assert "above tension_high" in seen.cause
+        key.release()
+        rig.wait(1.0)
+        bench.reset()
+        rig.wait(1.0)
+        out = HeldKey(rig, bench, pay_out=0.1).press()
+        rig.wait(1.0)
+        assert abs(rig.slaves[0].motor.velocity) > 10
+        out.release()
+        rig.wait(1.0)
 
 
 def test_an_emergency_without_a_fault_is_reported_and_trips_only_where_declared(

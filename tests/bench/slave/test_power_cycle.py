@@ -48,13 +48,6 @@ def homed_and_closed(rig: Rig, encoder: str = "incremental") -> None:
         assert winch.snapshot.length_known
 
 
-def power_cycle(rig: Rig) -> None:
-    rig.slaves[0].inject("switched off")
-    rig.wait(0.5)
-    rig.slaves[0].mend("switched off")
-    rig.wait(0.5)
-
-
 def require_unknown(bench: Bench, reason: str) -> None:
     """NaN with its flag and its reason, and no motion but a slow one that is held."""
     winch, slave_angle = bench.winch["A"], winch_angle(bench)
@@ -95,7 +88,7 @@ def test_a_power_cycle_makes_the_length_of_an_incremental_encoder_unknown(
     homed_and_closed(rig)
     slave = rig.slaves[0]
     slave.inject("counter begins anew", 0 if begins == "zero" else slave.motion.counts())
-    power_cycle(rig)
+    rig.power_cycle()
     with rig.opened() as bench:
         require_unknown(bench, "the drive was switched off since")
         key = HeldKey(rig, bench, pay_out=-0.02).press()
@@ -115,7 +108,7 @@ def test_a_power_cycle_makes_the_length_of_an_incremental_encoder_unknown(
 def test_an_absolute_encoder_needs_no_record(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
     homed_and_closed(rig, "absolute")
-    power_cycle(rig)
+    rig.power_cycle()
     Path(rig.bench_file.with_suffix(".position.json")).unlink()
     with rig.opened() as bench:
         assert bench.winch["A"].cable_length == pytest.approx(_LENGTH, abs=1e-3)
@@ -252,7 +245,7 @@ def test_homing_here_is_permitted_where_the_length_is_nonsense(rig: Rig) -> None
     """A count of -10^9 would mean far more cable than the drum has: no length, and no move."""
     slave = rig.slaves[0]
     slave.inject("counter begins anew", -1_000_000_000)
-    power_cycle(rig)
+    rig.power_cycle()
     with opened(rig, "absolute") as bench:
         winch = bench.winch["A"]
         require_unknown(bench, "more than the 5.561 m that its drum has")

@@ -36,13 +36,6 @@ def opened(rig: Rig, encoder: str, extra: str = "") -> Bench:
     return rig.open(text + f'length = ["0.5 m", "4.3 m"]\n{extra}')
 
 
-def power_cycle(rig: Rig) -> None:
-    rig.slaves[0].inject("switched off")
-    rig.wait(0.5)
-    rig.slaves[0].mend("switched off")
-    rig.wait(0.5)
-
-
 def homed(bench: Bench, rig: Rig) -> None:
     """Homed at 4 m, where nothing moves; then 0.1 m wound in, by the shaft."""
     slave, winch = rig.slaves[0], bench.winch["A"]
@@ -77,7 +70,7 @@ def test_after_a_power_cycle_it_is_that_of_an_absolute_encoder_only(rig: Rig, en
         rig.slaves[0].inject("counter begins anew", 0)
     with opened(rig, encoder) as bench:
         homed(bench, rig)
-    power_cycle(rig)
+    rig.power_cycle()
     rig.slaves[0].motor.angle += 0.05 / _ARM
     with rig.opened() as bench:
         if encoder == "incremental":

@@ -94,14 +94,6 @@ def test_a_jog_without_one_direction_is_refused(
     assert words in result.stderr
 
 
-@pytest.mark.parametrize("option", ["--step", "--by"])
-def test_signed_options_are_gone(bench: Served, option: str) -> None:
-    for command in ("jog", "move"):
-        result = invoke(command, "A", option, "0.05 m", "-b", bench.file)
-        assert result.exit_code == 2
-        assert "No such option" in result.stderr
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["jog", "move"])
 @pytest.mark.parametrize(("option", "sign"), [("--pay-out", 1), ("--wind-in", -1)])

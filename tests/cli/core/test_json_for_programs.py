@@ -7,13 +7,13 @@ import math
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from sim_process import first_line, start
 from winchkit.runs import read_run
 
 pytestmark = [
@@ -21,13 +21,7 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals of POSIX"),
 ]
 
-WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
 PIPE = subprocess.PIPE
-
-
-def start(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
-    words = [*WINCHKIT, *map(str, arguments)]
-    return subprocess.Popen(words, stdin=stdin, stdout=PIPE, stderr=PIPE, text=True)
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +32,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with start(*words, stdin=PIPE) as process:
         assert process.stdin is not None
         assert process.stdout is not None
-        assert process.stderr is not None
-        line = process.stdout.readline()
-        if not line:
-            reason = process.stderr.read()
-            if "ip route add" in reason:
-                pytest.skip(f"no route for multicast here: {reason}")
-            pytest.fail(reason)
-        assert json.loads(line) == {"schema": 1, "bench": str(path), "ready": True}
+        assert json.loads(first_line(process)) == {"schema": 1, "bench": str(path), "ready": True}
         yield path
         process.stdin.write("status\nnonsense\n")
         process.stdin.flush()

@@ -297,19 +297,6 @@ def test_check_reads_a_mapping_with_every_fault(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.slow
-def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) -> None:
-    path = log(tmp_path / "log.csv", HEAD.replace("force", "\x1b[2Jforce"))
-    done = subprocess.run(
-        [sys.executable, "-m", "winchkit", "import", str(path)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "\x1b" not in done.stdout + done.stderr
-    assert "\\x1b[2Jforce" in done.stdout
-
-
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [

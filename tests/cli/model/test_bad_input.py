@@ -47,63 +47,18 @@ def with_column(name: str, cells: list[str]) -> list[str]:
     return out
 
 
-def swapped(one: int, other: int) -> list[str]:
-    out = list(GOOD)
-    out[one], out[other] = out[other], out[one]
-    return out
-
-
-def without_column(name: str) -> list[str]:
-    column = GOOD[1].split(",").index(name)
-    cells = [line.split(",") for line in GOOD[1:]]
-    return [GOOD[0], *(",".join(c[:column] + c[column + 1 :]) for c in cells)]
-
-
-def replaced(old: str, new: str) -> list[str]:
-    return [line.replace(old, new) for line in GOOD]
-
-
 CASES: dict[str, tuple[list[str], str]] = {
-    "no motor angle": (
-        without_column("motor_angle [rad]"),
-        ": no column 'motor_angle [rad]'; it has time, motor_torque, tension, cable_length",
+    "of the reader, with its line": (
+        edited(GOOD, 41, 3, "n/a"),
+        ":42: column 'tension' has 'n/a'",
     ),
-    "no time": (without_column("time [s]"), ":2: there is no column 'time [s]'"),
-    "no output": (
-        [",".join(line.split(",")[:2]) for line in GOOD],
-        ": no column to compare; it needs at least one of cable_length, tension, motor_torque",
-    ),
-    "a unit that does not fit": (
-        replaced("tension [N]", "tension [m]"),
-        ":2: column 'tension' is in [m], a unit of length, not of force",
-    ),
-    "a mass for a force": (replaced("tension [N]", "tension [kg]"), "multiply by g = 9.80665"),
-    "an unknown unit": (
-        replaced("cable_length [m]", "cable_length [metre]"),
-        ":2: column 'cable_length' has the unknown unit [metre]",
-    ),
-    "text in a number": (edited(GOOD, 41, 3, "n/a"), ":42: column 'tension' has 'n/a'"),
-    "an empty file": ([], ": the file is empty"),
-    "a header alone": (GOOD[:2], ": the run has no rows after its header"),
-    "time goes back": (swapped(60, 61), ":62: time goes back from 1.18 s to 1.16 s"),
-    "time stands still": (edited(GOOD, 50, 0, "0.94"), ":51: time stands still at 0.94 s"),
-    "a row cut off": ([*GOOD[:-1], "3.98,1"], ":202: 2 cells in this row, 5 columns"),
-    "infinite": (edited(GOOD, 9, 4, "inf"), ":10: column 'cable_length' is infinite"),
-    "a bad load": (["# load_mass: 10 N", *GOOD[1:]], ":1: load_mass: "),
-    "a dead cell": (
+    "of the whole file": ([], ": the file is empty"),
+    "of what can be compared": (
         with_column("tension [N]", ["12.5"] * ROWS),
         ": column 'tension': constant at 12.5 in all 200 samples",
     ),
-    "nothing moves": (
-        with_column("motor_angle [rad]", ["3"] * ROWS),
-        ": column 'motor_angle': constant at 3 rad: nothing moves",
-    ),
-    "mostly missing": (
-        with_column("cable_length [m]", [""] * 150),
-        ": column 'cable_length': 150 of 200 samples are NaN; remove it",
-    ),
-    "too short": (GOOD[: HEADER + 30], ": only 30 samples; at least 50 are needed"),
 }
+"""The other faults: tests/runs/formats/test_csv.py, tests/diagnosis/data/test_validation.py."""
 
 
 @pytest.mark.parametrize("command", ["compare", "diagnose"])
@@ -164,23 +119,6 @@ def test_stretches_without_values_are_counted_and_not_filled(tmp_path: Path) -> 
     assert "NaN samples not compared: tension 40" in result.stdout
 
 
-def test_a_profile_of_another_winch(good: Path, tmp_path: Path) -> None:
-    other = tmp_path / "other.toml"
-    text = find("profiles", "bench-spiral").read_text()
-    other.write_text(text.replace("ratio = 20.4", "ratio = 10"))
-    refused(3, "column 'cable_length': changes by", "diagnose", good, "-p", other)
-    other.write_text(text.replace("ratio = 20.4", "ratio = 20.4\ndirection = -1"))
-    refused(3, "check gearbox.ratio, gearbox.direction", "compare", good, "-p", other)
-
-
-def test_the_same_run_twice(good: Path, tmp_path: Path) -> None:
-    copy = tmp_path / "copy.csv"
-    copy.write_text(good.read_text())
-    said = f"{copy}: holds the same samples as {good}; give it once"
-    refused(3, said, "diagnose", good, copy, "-p", "bench-spiral")
-    refused(3, "give it once", "compare", good, good, "-p", "bench-spiral")
-
-
 def test_an_unknown_profile(good: Path) -> None:
     refused(3, "bench-spirl", "compare", good, "-p", "bench-spirl")
     refused(3, "bench-spiral", "compare", good, "-p", "bench-spirl")
@@ -216,12 +154,6 @@ def test_an_effect_that_cannot_be_seen(effect: str, lacks: str, good: Path, tmp_
     assert not new.exists()
 
 
-def test_places_that_cannot_be_written(good: Path, tmp_path: Path) -> None:
-    nowhere = tmp_path / "none" / "new.toml"
-    arguments = ("-p", "bench-spiral", "--fit", good, "-o", nowhere)
-    refused(3, f"{nowhere}: cannot be written", "add", "motor-coulomb", *arguments)
-
-
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -241,15 +173,6 @@ def test_usage(arguments: tuple[str, ...], said: str, good: Path) -> None:
 @pytest.mark.parametrize("band", ["0", "-5", "nan"])
 def test_a_band_that_filters_nothing_or_all(band: str, good: Path) -> None:
     refused(2, "band", "compare", good, "-p", "bench-spiral", "--band", band)
-
-
-def test_a_report_that_cannot_be_written(good: Path, tmp_path: Path) -> None:
-    page = tmp_path / "page.html"
-    page.mkdir()
-    result = invoke("diagnose", good, "-p", "bench-spiral", "--html", page)
-    assert result.exit_code == 3
-    assert str(page) in result.stderr
-    assert "Traceback" not in result.stderr
 
 
 @pytest.mark.slow

@@ -198,18 +198,6 @@ def test_wrong_columns_are_named(run: Path, tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_motors_that_turn_the_other_way_are_suspected(run: Path, tmp_path: Path) -> None:
-    head, *lines = run.read_text().splitlines()
-    turned = [line.split(",") for line in lines]
-    for cells in turned:
-        cells[1:9] = [repr(-float(cell)) for cell in cells[1:9]]
-    run.write_text("\n".join([head, *(",".join(cells) for cells in turned)]) + "\n")
-    told = refused(3, "cabtive", run, "-o", tmp_path / "new.toml")
-    assert "motor-sign:all: all motor angles have the other sign" in told
-    assert "gearbox.direction" in told
-    assert not (tmp_path / "new.toml").exists()
-
-
 def test_a_line_without_values_is_refused(run: Path, tmp_path: Path) -> None:
     head, *lines = run.read_text().splitlines()
     cut = [",".join([*line.split(",")[:3], "", *line.split(",")[4:]]) for line in lines]

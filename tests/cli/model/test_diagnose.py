@@ -1,13 +1,17 @@
-"""What ``winchkit diagnose`` prints: one screen, more with --verbose, and the next command."""
+"""What ``winchkit diagnose`` prints, and the report of a fit that ``--fit-report`` adds."""
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
+from calibration_cases import rows
 from report_answers import recorded
+from robot_poses.truth import csv
 from winchkit.cli import main
 from winchkit.runs import write_run
 
@@ -48,16 +52,33 @@ def test_verbose_adds_how_it_was_reached(elastic: list[Path]) -> None:
         assert part not in short
 
 
-def test_a_wrong_value_of_the_profile_is_a_step_with_the_value_of_the_file(
-    elastic: list[Path], tmp_path: Path
-) -> None:
-    profile = tmp_path / "stiff.toml"
-    call("add", "cable-elongation-linear", "--fit", elastic[0], "-p", "bench-spiral", "-o", profile)
-    lines = profile.read_text().splitlines()
-    lines = [x for x in lines if not x.startswith("fitted = ")]
-    lines = ['axial_stiffness = "100 kN"' if x.startswith("axial_stiff") else x for x in lines]
-    profile.write_text("\n".join(lines))
-    result = call("diagnose", *elastic, "-p", profile)
-    assert result.stdout.splitlines()[0] == "EXPLAINED"
-    assert "kN instead of 100 kN in the profile. Corrected, the" in " ".join(result.stdout.split())
-    assert "next: winchkit add cable-elongation-linear" in result.stderr
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp("runs")
+    files = []
+    for run in recorded("demo-thick-layers"):
+        files.append(str(folder / f"{run.name}.csv"))
+        write_run(run, files[-1])
+    return files
+
+
+@pytest.mark.slow
+def test_a_diagnosis_prints_its_fit(runs: list[str]) -> None:
+    options = ["diagnose", *runs, "--profile", "bench-spiral"]
+    shown = CliRunner().invoke(main, [*options, "--fit-report"])
+    assert shown.exit_code == 0, shown.output
+    assert re.search(r"layer-thickness\.thickness_error: +4\.9\d+e-05 \+/- ", shown.stdout)
+    found = json.loads(CliRunner().invoke(main, [*options, "--json"]).stdout)["fit"]
+    assert found["dof"] == found["n_observations"] - found["n_unknowns"]
+    assert f"= {found['chi_square']:.6g}" in shown.stdout
+    assert "[[Fit" not in CliRunner().invoke(main, options).stdout
+
+
+def test_a_calibration_prints_its_fit(tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text(csv(rows()))
+    options = ["calibrate", "cabtive", str(poses), "-o", str(tmp_path / "new.toml")]
+    shown = CliRunner().invoke(main, [*options, "--fit-report"])
+    assert shown.exit_code == 0, shown.output
+    assert "[[Variables]]\n    1.exit_point.x:" in shown.stdout
+    assert "reduced chi-square" in shown.stdout

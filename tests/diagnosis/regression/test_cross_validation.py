@@ -168,30 +168,7 @@ class TestConfidence:
         same = np.arange(1.0, 21.0)
         assert signed_rank_p_value(same, same) == 1.0
 
-    def test_counts_signs_and_ranks(self) -> None:
-        """All of n blocks better has the chance 2⁻ⁿ, one sided."""
-        before = np.full(10, 10.0)
-        after = before - np.arange(1.0, 11.0)
-        assert signed_rank_p_value(before, after) == pytest.approx(2.0**-10)
-        assert signed_rank_p_value(after, before) == pytest.approx(1.0)
-
-    def test_uses_only_blocks_that_change(self) -> None:
-        random = np.random.default_rng(1)
-        before = np.full(48, 100.0)
-        after = before + 1e-3 * random.standard_normal(48)
-        after[:8] -= np.linspace(20, 40, 8)
-        assert signed_rank_p_value(before, after) == pytest.approx(2.0**-8)
-
     def test_of_few_blocks_is_never_small(self) -> None:
         before, after = np.full(4, 10.0), np.full(4, 1.0)
         assert signed_rank_p_value(before, after) == 1.0
         assert signed_rank_p_value(after, before) == 1.0
-
-    def test_of_noise_is_seldom_small(self) -> None:
-        random = np.random.default_rng(2)
-        chances = [
-            signed_rank_p_value(random.chisquare(20, 48), random.chisquare(20, 48))
-            for _ in range(300)
-        ]
-        # 300 cases of 5 %: 15, and 3.8 more or less.
-        assert 3 <= np.count_nonzero(np.array(chances) < 0.05) <= 28

@@ -1,4 +1,4 @@
-"""Effects fitted again, and signatures updated, after another effect was added."""
+"""Effects fitted again after another was added, and exchanged for a rival."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from diagnosis_runs import CATALOGUE, Ride, engine_for, term
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
 from winchkit.diagnosis.selection.stepwise import _exchanged_terms
+from winchkit.diagnosis.verdict.equivalence import equivalence_set
 from winchkit.effects.term import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
@@ -92,3 +93,38 @@ def test_a_new_signature_requires_all_to_be_computed_again(grown: Term, anew: bo
     silent = replace(engine.signatures, without_signature=((lag, {}, ({"time_constant": 0.05},)),))
     present = engine.initial_model.with_term(grown, engine.regression.n_runs)
     assert (updated_signatures(engine.regression, present, silent) is None) is anew
+
+
+ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
+"""Wound in once and not quite out again: a creep can look like a wrong length of cable."""
+
+
+@pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])
+def test_an_equivalent_effect_is_found_though_the_others_compensate(
+    radius_error: float,
+) -> None:
+    """On a grooved drum a wrong radius and a wrong ratio do the same to the last digit."""
+    hidden = (
+        term("drum-radius", radius_error=radius_error),
+        term("cable-creep", creep_stiffness=7e5, time_constant=20.0),
+    )
+    engine = engine_for(hidden, ONE_WAY)
+    start = engine.initial_model
+    for own in hidden:
+        start = start.with_term(own, engine.regression.n_runs)
+    final, noise = engine.fit_with_noise(start)
+    alone = engine.refit(final.hypothesis.without(0), noise).hypothesis.terms[0]
+    assert abs(np.log(alone.values["creep_stiffness"] / 7e5)) > 1.0
+    assert set(equivalence_set(engine, final, noise, 0).effects) == {"drum-radius", "gear-ratio"}
+
+
+def test_a_fixed_hypothesis_keeps_its_values() -> None:
+    creep = term("cable-creep", creep_stiffness=7e5, time_constant=20.0)
+    engine = engine_for([creep], ONE_WAY)
+    begin, noise = engine.fit_with_noise(engine.initial_model)
+    other = begin.hypothesis.with_term(
+        term("cable-creep", creep_stiffness=1e6, time_constant=5.0), engine.regression.n_runs
+    )
+    held = engine.fixed(other, noise)
+    assert held.vector == pytest.approx(engine.regression.vector(other))
+    assert engine.refit(other, noise).chi_square < held.chi_square

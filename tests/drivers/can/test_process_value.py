@@ -8,12 +8,13 @@ import struct
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import can
 import pytest
 
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.process_value import ProcessInstrument, ProcessLine
@@ -32,13 +33,6 @@ NODE = 5
 
 def device() -> DeviceSpec:
     return read_device(catalog.find("devices", "generic-cia404"))
-
-
-def until(condition: Callable[[], bool], within: float = 5.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.005)
 
 
 class Rig:

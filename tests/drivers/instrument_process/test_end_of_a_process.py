@@ -9,7 +9,7 @@ import subprocess
 import sys
 import textwrap
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,6 +17,7 @@ import pytest
 
 from busiest_thread import busiest_thread
 from modbus_peer import Peer
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.instrument_process.process import (
@@ -44,14 +45,6 @@ def line_at(port: int) -> ProcessLineSpec:
     device = read_device(catalog.find("devices", "laumas-tlb"))
     bus = BusSpec("modbus-tcp", host="127.0.0.1", port=port, timeout=0.1)
     return ProcessLineSpec("cells", bus, (LineInstrument("cell of winch A", device, 1, 50.0),))
-
-
-def until(condition: Callable[[], bool], within: float = 5.0) -> float:
-    begin = time.monotonic()
-    while not condition():
-        assert time.monotonic() < begin + within, "it did not come to that"
-        time.sleep(0.002)
-    return time.monotonic() - begin
 
 
 class Bench:

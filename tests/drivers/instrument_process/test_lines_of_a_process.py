@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import Any, NamedTuple
@@ -16,6 +15,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from modbus_peer import Peer
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.instrument_process.process import (
@@ -75,13 +75,6 @@ def weigh(peer: Peer, counts: int) -> None:
     peer.registers[6] = 1 << 11
     for register in (7, 9):
         peer.registers[register], peer.registers[register + 1] = counts >> 16, counts & 0xFFFF
-
-
-def until(condition: Callable[[], bool], within: float = 6.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.005)
 
 
 def test_readings_are_judged_with_calibration_tare_and_times(how: str) -> None:

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modbus_cell import CLOCK, PATIENT, cell, collected, until, weigh
+from modbus_cell import CLOCK, PATIENT, cell, collected, weigh
 from modbus_peer import Peer
+from waiting import until
 from winchkit.drivers.modbus.deviations import Deviations
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine

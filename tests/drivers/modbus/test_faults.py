@@ -6,8 +6,9 @@ import struct
 
 import pytest
 
-from modbus_cell import PATIENT, cell, collected, polled, until, weigh
+from modbus_cell import PATIENT, cell, collected, polled, weigh
 from modbus_peer import Peer
+from waiting import until
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 
 

@@ -8,18 +8,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from modbus_peers.faulty_line import crc
 from winchkit.drivers.modbus.frames import AnswerGate, crc16
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 
 
 def rtu(*parts: int) -> bytes:
-    body = bytes(parts)
-    register = 0xFFFF
-    for byte in body:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ (0xA001 if register & 1 else 0)
-    return body + register.to_bytes(2, "little")
+    return bytes(parts) + crc(bytes(parts))
 
 
 def tcp(transaction: int, *parts: int) -> bytes:

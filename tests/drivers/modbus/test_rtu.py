@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from modbus_peers.faulty_line import crc
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
@@ -23,20 +24,6 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 
 CLOCK = MonotonicClock()
 Behaviour = Callable[[int, bytes], tuple[float, bytes]]
-
-
-def crc(frame: bytes) -> bytes:
-    """CRC-16/MODBUS, low byte first."""
-    register = 0xFFFF
-    for byte in frame:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ (0xA001 if register & 1 else 0)
-    return register.to_bytes(2, "little")
-
-
-def test_the_check_sum_is_the_one_of_the_specification() -> None:
-    assert crc(bytes.fromhex("0103000a0001")) == bytes.fromhex("a408")
 
 
 def answer(request: bytes) -> bytes:

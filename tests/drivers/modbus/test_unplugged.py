@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from served import Served
+from waiting import until
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
@@ -22,13 +21,6 @@ from winchkit.schema.read import read_device
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 CLOCK = MonotonicClock()
-
-
-def until(condition: Callable[[], bool], within: float = 10.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.005)
 
 
 def cell(rate: float = 100.0) -> Instrument:

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
+import diagnosis_hour as hour
 from winchkit.diagnosis.data import decimation as decimate
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.effects import load_catalogue
 from winchkit.fleet.diagnosis.diagnose import diagnose_each
 from winchkit.schema.read import read_profile
-
-BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
-sys.path.insert(0, str(BENCHMARKS))
-
-import diagnosis_hour as hour  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
-from chromium import NEEDS_CHROMIUM, chromium
+from browsing import NEEDS_CHROMIUM, chromium
 from report_answers import recorded
 from winchkit.cli import main
 from winchkit.runs.writer import write_run

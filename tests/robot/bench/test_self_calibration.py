@@ -17,18 +17,10 @@ from winchkit.runs.run import Run
 
 
 @pytest.mark.slow
-def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
-    found = robot_self_calibrated.measure(5, 10, 2, "40 ms", "--box", "40 mm", "--turn", "4 deg")
-    assert found["written"]
-    assert not found["refused"]
-    assert found["held_out_before_mm"] > 0.2
-    assert found["held_out_after_mm"] < 0.25 * found["held_out_before_mm"]
-
-
-@pytest.mark.slow
 def test_cables_stay_taut_where_the_points_are_5_mm_wrong() -> None:
     """A cable of this robot falls below 2 N where motions go on by the profile's geometry."""
     found = robot_self_calibrated.measure(281141, 20, 4, "40 ms")
+    assert found["written"]
     assert not found["refused"]
     assert found["held_out_after_mm"] < 0.04 < found["held_out_before_mm"]
 

@@ -11,7 +11,6 @@ from scipy.optimize import nnls
 
 from calibration_cases import EXACT, held, measured, robot, rows, true_values, with_turns
 from robot_poses.truth import Noise, Truth, csv
-from winchkit.errors import RunError, UsageError
 from winchkit.robot import robot_of, rotation_of, structure_matrix
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate, split
 from winchkit.robot.calibration.options import Options
@@ -78,7 +77,7 @@ def test_a_bound_is_kept_and_reported(paper: Calibrated) -> None:
     assert held_at
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_starts_ten_millimetres_off_all_converge(seed: int) -> None:
     rng, truth = random.Random(seed), Truth()
     lines = []
@@ -203,27 +202,10 @@ def test_every_tenth_pose_is_held_out() -> None:
     assert out.position[0].tolist() == list(rows()[9].seen_position)
 
 
-@pytest.mark.parametrize("count", [1, 2])
-def test_too_few_poses_are_refused(count: int) -> None:
-    with pytest.raises(UsageError, match=f"{count} poses"):
-        calibrate(robot(), measured(csv(rows()[:count])), held())
-
-
-def test_positions_in_the_wrong_unit_are_noticed() -> None:
-    fit = measured(csv(rows()))
-    with pytest.raises(RunError, match="position-unit:mm: the positions are in millimetres"):
-        calibrate(robot(), replace(fit, position=fit.position * 1e3), held())
-
-
 def test_instruments_said_to_be_perfect_break_nothing() -> None:
     sigma = {"position": 1e-10, "closure": 1e-9}
     found = calibrate(robot(), measured(csv(rows())), held(), Options(sigma=sigma))
     assert rms(found.validation_after.distance) < 1e-4
-
-
-def test_unknown_effects_are_refused_with_the_ones_there_are() -> None:
-    with pytest.raises(UsageError, match="did you mean 'home-length'"):
-        calibrate(robot(), measured(csv(rows())), held(), Options(effects=("home-lenght",)))
 
 
 def test_proposed_poses_say_more_than_poses_at_random() -> None:

@@ -164,7 +164,7 @@ def forces(pose: Array) -> Array:
     return np.asarray(found)
 
 
-def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Robot, MeasuredPoses]:
+def without_tracker(count: int, seed: int) -> tuple[Robot, MeasuredPoses]:
     """The true robot, and swivels, cells and roll and pitch of an IMU at poses at rest."""
     rng = np.random.default_rng(seed)
     home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
@@ -173,7 +173,7 @@ def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Ro
         about = home + np.concatenate([rng.uniform(-0.12, 0.12, 3), np.zeros(3)])
         poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
     shorter = (ropes(home) - np.array([ropes(pose) for pose in poses])).tolist()
-    motor = np.array([[wound_in(i, s) * ratio[i] for i, s in enumerate(row)] for row in shorter])
+    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter])
     swivel = np.array([[swivel_of(pose, i) + 0.3 * i - 1 for i in range(ROPES)] for pose in poses])
     pull = np.array([forces(pose) for pose in poses])
     angles = np.array(poses)[:, 3:] + rng.normal(0, 5e-4, (count, 3))
@@ -213,31 +213,8 @@ def swivel_of(pose: Array, line: int) -> float:
     return float(np.arctan2(seen[1], seen[0]))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("wrong", [2, pytest.param(0, marks=pytest.mark.campaign)])
-def test_a_ratio_is_named_on_its_winch_without_a_tracker(wrong: int) -> None:
-    """Statics of the hanging platform take part: without tensions the ratio is not determined."""
-    ratio = tuple(1.01 if i == wrong else 1.0 for i in range(ROPES))
-    nominal, measured = without_tracker(50, 5, ratio)
-    found = calibrate(nominal, *split(measured))
-    assert found.solution.converged
-    assert "balance" in found.weights.sigma
-    (told,) = (text for text in found.warnings if "the cable per motor turn differs" in text)
-    assert told.startswith(f"line {wrong + 1}: the cable per motor turn differs by -")
-    share = float(told.split("differs by ")[1].split()[0])
-    assert share == pytest.approx(-100 * 0.01 / 1.01, abs=0.25)
-
-
-@pytest.mark.slow
-def test_no_ratio_is_named_where_all_are_right() -> None:
-    nominal, measured = without_tracker(50, 6, (1.0,) * ROPES)
-    found = calibrate(nominal, *split(measured))
-    assert not any("the cable per motor turn differs" in text for text in found.warnings)
-    assert not found.unexplained
-
-
 def test_the_equilibrium_has_the_derivatives_of_its_residual() -> None:
-    nominal, measured = without_tracker(3, 7, (1.0,) * ROPES)
+    nominal, measured = without_tracker(3, 7)
     rng = np.random.default_rng(1)
     pose = Pose(HOME + rng.normal(0, 0.05, (3, 3)), rotation_of(*rng.normal(0, 0.05, (3, 3))))
     platform = nominal.platform
@@ -263,7 +240,7 @@ def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
 @pytest.mark.slow
 def test_inverted_swivel_encoders_are_refused() -> None:
     """As the directions of the pulleys of a real robot were: a noise of 20 degrees was fitted."""
-    nominal, measured = without_tracker(14, 7, (1.0,) * ROPES)
+    nominal, measured = without_tracker(14, 7)
     found = calibrate(nominal, *split(replace(measured, swivel=-measured.swivel)))
     assert "not calibrated: the swivel angles do not follow the geometry" in found.refusal
     assert "swivel_axis" in found.refusal
@@ -272,7 +249,7 @@ def test_inverted_swivel_encoders_are_refused() -> None:
 @pytest.mark.slow
 def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
     """A robot that is switched on anywhere: its home is declared 50 mm beside the true one."""
-    nominal, measured = without_tracker(30, 8, (1.0,) * ROPES)
+    nominal, measured = without_tracker(30, 8)
     profile, away = nominal.profile, np.array([0.03, -0.03, 0.03])
     declared = np.array(profile.home.position) + away
     x, y, z = declared.tolist()

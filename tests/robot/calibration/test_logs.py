@@ -43,6 +43,10 @@ def calibrated(folder: Path, log: str) -> dict[str, Any]:
 def test_ratio_and_gain_are_found_with_their_lines(folder: Path) -> None:
     found = calibrated(folder, "wrong.csv")
     assert found["ratios"]["named"] == ["3"]
+    told = [text for text in found["warnings"] if "the cable per motor turn differs" in text]
+    assert [text.partition(" by -")[0] for text in told] == [
+        "line 3: the cable per motor turn differs"
+    ]
     (line,) = (each for each in found["ratios"]["lines"] if each["named"])
     assert abs(line["change"] - (1 / 1.06 - 1)) < 4 * line["std"]
     assert line["std"] < 1e-3
@@ -60,6 +64,7 @@ def test_ratio_and_gain_are_found_with_their_lines(folder: Path) -> None:
 def test_nothing_is_named_where_all_is_right(folder: Path) -> None:
     found = calibrated(folder, "right.csv")
     assert found["ratios"]["named"] == []
+    assert not any("the cable per motor turn differs" in text for text in found["warnings"])
     assert found["instruments"] == {}
     assert found["validation"]["length_rms_after"] < found["validation"]["length_rms_before"]
     assert found["fit"]["poses"] == 33

@@ -169,22 +169,3 @@ def test_nothing_is_written_where_the_starting_profile_predicts_better(tmp_path:
     assert result.exit_code == 1
     assert "not calibrated: the held-out position error" in result.stderr
     assert not (tmp_path / "worse.toml").exists()
-
-
-@pytest.mark.slow
-def test_random_frames_and_offsets_end_in_words_or_in_a_calibration() -> None:
-    """A dozen of the thousand frames and offsets of benchmarks/robot_metrology.py."""
-    rng = np.random.default_rng(18)
-    made = rows(40, 11, noise=EXACT)
-    for _ in range(12):
-        axis, shift, offset = rng.normal(size=(3, 3))
-        station = Station(
-            float(10 ** rng.uniform(-2, 2.25)),
-            tuple(axis),
-            tuple(shift * 10 ** rng.uniform(-4, 0)),
-            tuple(offset * 10 ** rng.uniform(-3, -0.8)),
-            turns_rotation=bool(rng.random() < 0.5),
-        )
-        text = csv(station.show(made, 1), angles=bool(rng.random() < 0.5))
-        found = calibrate(robot(), *split(measured(text)))
-        assert found.refusal or rms(found.validation_after.distance) < 1e-3

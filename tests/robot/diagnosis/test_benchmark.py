@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from robot_diagnosis import added, covered, right, wrong
 from robot_poses.cases import CASES
 
@@ -55,10 +57,14 @@ def test_outside_the_catalogue_nothing_is_certain_and_no_finding_needs_missing_r
     assert right(BY_NAME["outside: tracker's metre"], whole)
 
 
-def test_an_interval_holds_the_truth_or_does_not(tmp_path: Path) -> None:
+def test_an_interval_holds_the_truth_or_does_not() -> None:
     case = BY_NAME["payload mass"]
     step = found("explained", {"payload-mass": [None]})
     for ends, held in (((0.2, 0.3), True), ((0.26, 0.3), False)):
         step["steps"][0]["parameters"] = {"payload-mass": {"mass_error": {"interval": ends}}}
         assert covered(case, step) == {"payload-mass.mass_error": held}
-    assert set(added(case, 1, tmp_path)) == {"payload-mass.mass_error"}
+
+
+@pytest.mark.campaign
+def test_the_interval_of_an_addition_has_the_same_name(tmp_path: Path) -> None:
+    assert set(added(BY_NAME["payload mass"], 1, tmp_path)) == {"payload-mass.mass_error"}

@@ -49,7 +49,7 @@ def named(found: dict[str, Any]) -> list[str]:
     "case",
     [
         "exit point",
-        "payload mass",
+        pytest.param("payload mass", marks=pytest.mark.campaign),
         pytest.param("elastic ropes", marks=pytest.mark.campaign),
         pytest.param("home length", marks=pytest.mark.campaign),
     ],
@@ -80,6 +80,12 @@ def test_two_effects_on_different_equations_share_what_was_unexplained(tmp_path:
     assert sorted(named(found)) == ["home-length/4", "payload-mass"]
     assert all(step["certain"] for step in found["steps"])
     assert sum(step["share"] for step in found["steps"]) == pytest.approx(1.0, abs=0.05)
+    (payload,) = (step for step in found["steps"] if step["effects"] == ["payload-mass"])
+    assert (payload["law"], payload["doubts"]) == ("established", [])
+    assert [(place["output"], place["line"]) for place in payload["place"]] == [("tension", None)]
+    tension = found["outputs"]["tension"]
+    assert tension["heldout_rms_after"] < 1.2 * tension["noise_rms"]
+    assert tension["heldout_rms_before"] > 1.2 * tension["heldout_rms_after"]
 
 
 def test_a_wrong_value_of_the_profile_is_a_step_beside_that_of_the_file(tmp_path: Path) -> None:

@@ -168,6 +168,7 @@ def test_whichever_program_wrote_it(file: Path, encode: object) -> None:
         (PLAIN.replace("tension [N]", "tension [kg]"), 1, "load_mass: 15 kg"),
         (PLAIN.replace("tension [N]", "load [g]"), 1, "a mass, and a force is needed"),
         (PLAIN.replace("tension [N]", "tension [n]"), 1, "did you mean"),
+        (PLAIN.replace("tension [N]", "tension [metre]"), 1, "the unknown unit [metre]"),
         (PLAIN.replace("tension [N]", "[N]"), 1, "column 3 is called '[N]'"),
         (PLAIN.replace("tension [N]", ""), 1, "column 3 is called ''"),
         (PLAIN.replace(",11", ",1l"), 3, "column 'tension' has '1l'"),

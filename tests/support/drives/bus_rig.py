@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import can
-import pytest
 from can.interfaces.socketcan import SocketcanBus
 
 from drive_server import HOST, NODE, DriveServer
+from sim_process import free_port
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.schema.bench import BenchSpec, BusSpec, DeviceRef, LimitSpec, WinchWiring
@@ -190,13 +190,7 @@ def transport(name: str) -> Transport:
         channel = f"conformance-{os.getpid()}-{os.urandom(3).hex()}"
         return Transport(name, replace(here, interface=name, channel=channel), remote=False)
     if name == "udp_multicast":
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("", 0))
-            port = probe.getsockname()[1]
-            try:
-                probe.sendto(b"", (_GROUP, port))
-            except OSError as error:
-                pytest.skip(f"no route for multicast here: {error}")
+        port = free_port(_GROUP)
         return Transport(name, replace(here, interface=name, channel=_GROUP, port=port))
     channel = os.environ["WINCHKIT_TEST_CAN"]
     return Transport(name, replace(here, interface=name, channel=channel), cycle=0.02)

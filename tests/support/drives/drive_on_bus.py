@@ -6,19 +6,27 @@ import itertools
 import os
 import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import can
 
 from flywheel import Flywheel
 from winchkit import catalog
+from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.state_machine import RequestedState
+from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.drive.drive import SimDrive
 from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
 
+CLOCK = MonotonicClock()
 _channels = itertools.count()
+_syncs = itertools.count(1)
 
 
 def bus_spec() -> BusSpec:
@@ -87,3 +95,50 @@ class DriveOnBus:
                     self.frames.append((message.arbitration_id, bytes(message.data)))
                     self.drive.receive(message.arbitration_id, bytes(message.data), now)
                 self.drive.tick(now)
+
+
+Driven = tuple[DriveOnBus, CanBus]
+
+
+@contextmanager
+def driven_bus() -> Iterator[Driven]:
+    """A drive on a bus of its own, and the bench's end of that bus."""
+    spec = bus_spec()
+    with DriveOnBus(spec) as drive:
+        bus = CanBus(spec, "can", CLOCK)
+        try:
+            yield drive, bus
+        finally:
+            bus.close()
+
+
+def run_cycles(
+    driven: Driven, axis: Cia402Axis, requested: RequestedState, count: int, velocity: float = 0.0
+) -> set[str]:
+    """Cycles of a control loop in miniature; the states that the drive went through."""
+    drive, bus = driven
+    seen = set()
+    for _ in range(count):
+        axis.begin_cycle(next(_syncs), CLOCK.now())
+        bus.sync()
+        bus.heartbeat(127, 5)
+        time.sleep(0.005)
+        seen.add(drive.drive.state.name)
+        axis.send(requested, velocity=velocity)
+    return seen
+
+
+def run_until(
+    driven: Driven,
+    axis: Cia402Axis,
+    requested: RequestedState,
+    condition: Callable[[], bool],
+    velocity: float = 0.0,
+) -> set[str]:
+    """Cycles until something holds, however late the thread of the drive is run."""
+    seen: set[str] = set()
+    for _ in range(1500):
+        if condition():
+            return seen
+        seen |= run_cycles(driven, axis, requested, 1, velocity)
+    raise AssertionError(f"it did not come to that; the drive is {axis.state}")

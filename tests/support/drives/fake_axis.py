@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import pytest
+
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.loop import ControlLoop
+from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
@@ -248,6 +252,12 @@ class Rig:
     def cable(self, name: str = "A") -> CableMap:
         return self.loop.winches[name].cable
 
+    def jog(self, speed: float, hold: float = 1e6) -> Jog:
+        """Winch A begins to jog, for a long time unless it is held for a shorter one."""
+        source = Jog(self.cable(), self.limits, speed, DeadMan(self.now + hold))
+        self.controller().begin(source)
+        return source
+
     def sleep(self, duration: float) -> None:
         raise AssertionError("simulated time does not sleep")
 
@@ -263,3 +273,12 @@ class Rig:
 
     def run(self, duration: float) -> None:
         self.step(round(duration / CYCLE))
+
+
+def moving_rig(limits: LimitSpec, speed: float = 0.2, names: str = "AB") -> Rig:
+    """Winches of which A jogs for a long time."""
+    rig = Rig(limits, names)
+    rig.jog(speed)
+    rig.run(0.5)
+    assert rig.speeds[-1] == pytest.approx(speed)
+    return rig

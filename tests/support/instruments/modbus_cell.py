@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from modbus_peer import Peer
@@ -42,13 +41,6 @@ def polled(peer: Peer, *instruments: Instrument, timeout: float = 0.1) -> Iterat
         yield slow
     finally:
         slow.close()
-
-
-def until(condition: Callable[[], bool], within: float = 3.0) -> None:
-    deadline = time.monotonic() + within
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.005)
 
 
 def collected(instrument: Instrument) -> list[InstrumentReading]:

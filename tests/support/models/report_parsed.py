@@ -61,3 +61,16 @@ class Page(HTMLParser):
 
     def count(self, tag: str) -> int:
         return sum(name == tag for name, _ in self.elements)
+
+    def require_whole(self) -> None:
+        """One heading, captioned tables, single ids, data of every figure; nothing from outside."""
+        assert self.count("h1") == 1
+        assert self.count("script") == 2
+        assert self.count("table") == self.count("caption")
+        for tag, attributes in self.elements:
+            assert tag not in {"link", "iframe", "object", "img"}
+            assert not {"src", "action", "srcset"} & attributes.keys()
+            assert str(attributes.get("href", "#")).startswith("#")
+        ids = [a["id"] for _, a in self.elements if "id" in a]
+        assert len(ids) == len(set(ids))
+        assert set(self.shown) == self.figures.keys()

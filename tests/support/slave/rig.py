@@ -130,6 +130,13 @@ class Rig:
             assert self.time < end, "it did not come to that"
             self.wait(STEP)
 
+    def power_cycle(self) -> None:
+        """The first drive is switched off for half a second."""
+        self.slaves[0].inject("switched off")
+        self.wait(0.5)
+        self.slaves[0].mend("switched off")
+        self.wait(0.5)
+
     def from_host(self, frame: Frame) -> None:
         """A frame that winchkit sends."""
         self._to_slaves.append(frame)

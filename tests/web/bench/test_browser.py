@@ -14,8 +14,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import Served, opened, texts, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, Served, opened, texts, until
 from recordings_of_others import lay_out
 from robot_poses.truth import Truth, csv, poses
 from winchkit.runs.writer import write_run

@@ -11,8 +11,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import STARTS, Served, opened, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, STARTS, Served, opened, until
 
 STOPS = 2.0
 """Bound for a jog to end after its release, s: dead-man 0.2 s, ramp 0.05 / 1 s, pictures 0.1 s,

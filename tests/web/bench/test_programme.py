@@ -13,8 +13,7 @@ pytest.importorskip("playwright.sync_api")
 
 from playwright.sync_api import TimeoutError as PlaywrightTimeout
 
-from browsing import Served, number, opened, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, Served, number, opened, until
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
 

@@ -11,8 +11,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import Served, opened, until
-from chromium import NEEDS_CHROMIUM
+from browsing import NEEDS_CHROMIUM, Served, opened, until
 from winchkit import find
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import can
@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drive_on_bus import DriveOnBus, bus_spec, device
+from waiting import until
 from winchkit.drivers.can.bus import bus as bus_module
 from winchkit.drivers.can.bus.bus import CanBus, FrameTime
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
@@ -25,14 +26,6 @@ from winchkit.errors import ConnectionLost
 
 CLOCK = MonotonicClock()
 Commissioned = tuple[DriveOnBus, CanBus, Cia402Axis]
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Wait for something that is bound to happen soon."""
-    deadline = time.monotonic() + 5.0
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.002)
 
 
 def test_an_exception_of_a_handler_is_a_fault_of_the_bus_that_names_it() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import threading
 import time
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import can
 import pytest
 
+from sim_process import free_port
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.interface import _Library
 from winchkit.drivers.clock import MonotonicClock
@@ -21,14 +21,7 @@ _RPDO, _SDO, _NMT = 0x201, 0x601, 0x000
 
 @pytest.fixture
 def group() -> BusSpec:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("", 0))
-        port = probe.getsockname()[1]
-        try:
-            probe.sendto(b"", (_GROUP, port))
-        except OSError as error:
-            pytest.skip(f"no route for multicast here: {error}")
-    return BusSpec("can", interface="udp_multicast", channel=_GROUP, port=port)
+    return BusSpec("can", interface="udp_multicast", channel=_GROUP, port=free_port(_GROUP))
 
 
 def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None:

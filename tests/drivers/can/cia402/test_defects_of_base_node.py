@@ -2,86 +2,38 @@
 
 from __future__ import annotations
 
-import itertools
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from drive_on_bus import DriveOnBus, bus_spec, device
+from drive_on_bus import CLOCK, Driven, device, driven_bus, run_cycles, run_until
 from hand_made import NODE, RPDO, HandMade, codec
+from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
-from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 
-CLOCK = MonotonicClock()
-Rig = tuple[DriveOnBus, CanBus]
-_syncs = itertools.count(1)
+
+@pytest.fixture
+def rig() -> Iterator[Driven]:
+    with driven_bus() as made:
+        yield made
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
-    spec = bus_spec()
-    with DriveOnBus(spec) as drive:
-        bus = CanBus(spec, "can", CLOCK)
-        yield drive, bus
-        bus.close()
-
-
-@pytest.fixture
-def axis(rig: Rig) -> Cia402Axis:
+def axis(rig: Driven) -> Cia402Axis:
     watch = WatchSpec(127, 0.2, 0.004, True, prove=False)
     axis = Cia402Axis(rig[1], 1, device(), watch, CLOCK)
     axis.commission()
     return axis
-
-
-def run(
-    rig: Rig, axis: Cia402Axis, requested: RequestedState, count: int, velocity: float = 0.0
-) -> set[str]:
-    """Cycles of a control loop in miniature; the states that the drive went through."""
-    drive, bus = rig
-    seen = set()
-    for _ in range(count):
-        axis.begin_cycle(next(_syncs), CLOCK.now())
-        bus.sync()
-        bus.heartbeat(127, 5)
-        time.sleep(0.005)
-        seen.add(drive.drive.state.name)
-        axis.send(requested, velocity=velocity)
-    return seen
-
-
-def until(condition: Callable[[], bool]) -> None:
-    """Wait for something that is bound to happen soon."""
-    deadline = time.monotonic() + 5.0
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come to that"
-        time.sleep(0.002)
-
-
-def run_until(
-    rig: Rig,
-    axis: Cia402Axis,
-    requested: RequestedState,
-    condition: Callable[[], bool],
-    velocity: float = 0.0,
-) -> set[str]:
-    """Cycles until something holds, however late the thread of the drive is run."""
-    seen: set[str] = set()
-    for _ in range(1500):
-        if condition():
-            return seen
-        seen |= run(rig, axis, requested, 1, velocity)
-    raise AssertionError(f"it did not come to that; the drive is {axis.state}")
 
 
 def node_on(bus: CanBus, node: int = 1) -> SdoNode:
@@ -101,15 +53,15 @@ def node_on(bus: CanBus, node: int = 1) -> SdoNode:
     ],
 )
 def test_1_a_stop_of_a_disabled_drive_energises_nothing(
-    rig: Rig, axis: Cia402Axis, requested: RequestedState
+    rig: Driven, axis: Cia402Axis, requested: RequestedState
 ) -> None:
     """BaseNode402 goes through operation enabled on its way to quick stop active."""
-    assert run(rig, axis, requested, 20) == {"SWITCH_ON_DISABLED"}
+    assert run_cycles(rig, axis, requested, 20) == {"SWITCH_ON_DISABLED"}
 
 
 @pytest.mark.parametrize("option", [2, 6])
 def test_2_a_quick_stop_is_not_followed_by_enabling(
-    rig: Rig, axis: Cia402Axis, option: int
+    rig: Driven, axis: Cia402Axis, option: int
 ) -> None:
     with rig[0].lock:
         rig[0].drive.objects.put(0x605A, 0, option)
@@ -123,12 +75,12 @@ def test_2_a_quick_stop_is_not_followed_by_enabling(
         velocity=2.0,
     )
     run_until(rig, axis, RequestedState.STOP, lambda: drive.state.name != "OPERATION_ENABLED")
-    after = run(rig, axis, RequestedState.STOP, 70)
+    after = run_cycles(rig, axis, RequestedState.STOP, 70)
     after |= run_until(rig, axis, RequestedState.STOP, lambda: abs(shaft.motor_velocity) < 0.05)
     assert "OPERATION_ENABLED" not in after
 
 
-def test_3_a_reset_ends_disabled(rig: Rig, axis: Cia402Axis) -> None:
+def test_3_a_reset_ends_disabled(rig: Driven, axis: Cia402Axis) -> None:
     with rig[0].lock:
         rig[0].drive.inject("over-current")
     drive = rig[0].drive
@@ -137,15 +89,15 @@ def test_3_a_reset_ends_disabled(rig: Rig, axis: Cia402Axis) -> None:
     seen = run_until(
         rig, axis, RequestedState.RESET, lambda: drive.state.name == "SWITCH_ON_DISABLED"
     )
-    seen |= run(rig, axis, RequestedState.RESET, 20)
+    seen |= run_cycles(rig, axis, RequestedState.RESET, 20)
     assert seen <= {"FAULT", "SWITCH_ON_DISABLED"}
     assert drive.state.name == "SWITCH_ON_DISABLED"
 
 
-def test_4_a_refused_mode_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
+def test_4_a_refused_mode_is_an_error(rig: Driven, axis: Cia402Axis) -> None:
     """And nothing was written for it."""
     drive, _ = rig
-    run(rig, axis, RequestedState.DISABLE, 3)
+    run_cycles(rig, axis, RequestedState.DISABLE, 3)
     assert axis.drive is not None
     missing = next(m for m in ("IP", "CST", "PT", "XX") if m not in axis.drive.modes)
     before = len(drive.frames)
@@ -156,10 +108,10 @@ def test_4_a_refused_mode_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
     assert axis.mode == "CSV"
 
 
-def test_4_a_mode_that_the_drive_does_not_take_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
+def test_4_a_mode_that_the_drive_does_not_take_is_an_error(rig: Driven, axis: Cia402Axis) -> None:
     """It accepts 6060h and goes on showing the old one."""
     drive, _ = rig
-    run(rig, axis, RequestedState.DISABLE, 3)
+    run_cycles(rig, axis, RequestedState.DISABLE, 3)
     with drive.lock:
         drive.drive.objects.watchers[0x6060] = lambda _sub, _value: None
         shown = drive.drive.objects
@@ -170,18 +122,18 @@ def test_4_a_mode_that_the_drive_does_not_take_is_an_error(rig: Rig, axis: Cia40
     assert axis.mode == "CSV"
 
 
-def test_5_the_control_word_is_sent_every_cycle(rig: Rig, axis: Cia402Axis) -> None:
+def test_5_the_control_word_is_sent_every_cycle(rig: Driven, axis: Cia402Axis) -> None:
     drive, bus = rig
-    run(rig, axis, RequestedState.DISABLE, 5)
+    run_cycles(rig, axis, RequestedState.DISABLE, 5)
     sent = bus.sent
-    run(rig, axis, RequestedState.DISABLE, 10)
+    run_cycles(rig, axis, RequestedState.DISABLE, 10)
     until(lambda: sum(i < 0x580 or i > 0x700 for i, _ in drive.frames) >= bus.sent)
     assert bus.sent == sent + 30, "SYNC, heartbeat and command"
     cycles = [i for i, _ in drive.frames if i in (0x080, 0x201)]
     assert cycles[-20:] == [0x080, 0x201] * 10
 
 
-def test_6_a_cycle_costs_no_sdo_and_silence_is_not_a_state(rig: Rig, axis: Cia402Axis) -> None:
+def test_6_a_cycle_costs_no_sdo_and_silence_is_not_a_state(rig: Driven, axis: Cia402Axis) -> None:
     drive, bus = rig
     assert axis.feedback is None
     assert axis.state is DriveState.UNKNOWN
@@ -207,7 +159,7 @@ def test_7_pre_operational_is_not_operational() -> None:
     assert made.axis.operational
 
 
-def test_8_sdo_of_four_threads_do_not_mix(rig: Rig) -> None:
+def test_8_sdo_of_four_threads_do_not_mix(rig: Driven) -> None:
     """The library's own client failed 50 of 600 times."""
     _, bus = rig
     node = node_on(bus)
@@ -239,7 +191,7 @@ def test_8_sdo_of_four_threads_do_not_mix(rig: Rig) -> None:
 
 
 def test_8_a_write_that_is_not_answered_is_not_written_again(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
+    rig: Driven, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It may have arrived: the effect of a second one is unknown."""
     drive, bus = rig
@@ -253,7 +205,7 @@ def test_8_a_write_that_is_not_answered_is_not_written_again(
 
 
 def test_8_an_answer_that_came_too_late_is_not_the_next_one_s(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
+    rig: Driven, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive, bus = rig
     held: list[bytes] = []
@@ -269,7 +221,7 @@ def test_8_an_answer_that_came_too_late_is_not_the_next_one_s(
     assert node.read(0x1017) == drive.drive.objects.number(0x1017)
 
 
-def test_8_one_node_s_silence_does_not_hold_up_another(rig: Rig) -> None:
+def test_8_one_node_s_silence_does_not_hold_up_another(rig: Driven) -> None:
     _, bus = rig
     silent, alive = node_on(bus, 9), node_on(bus, 1)
     ended = threading.Event()
@@ -287,9 +239,11 @@ def test_8_one_node_s_silence_does_not_hold_up_another(rig: Rig) -> None:
     assert values == [402] * 5
 
 
-def test_8_aborts_are_reported_in_words(rig: Rig) -> None:
+def test_8_aborts_are_reported_in_words(rig: Driven) -> None:
     node = node_on(rig[1])
-    with pytest.raises(DeviceRefused, match=r"refused to write 1 to it: Code 0x06010002, .*read"):
+    words = r"6041h \(Statusword\).*refused to write 1 to it: Code 0x06010002, .*read"
+    with pytest.raises(DeviceRefused, match=words):
         node.write(0x6041, 0, 1)
+    assert node.read_if_there(0x5FFF) is None
     with pytest.raises(NotPermitted, match="70000 does not fit into its 16 bits"):
         node.write(0x6040, 0, 70_000)

@@ -8,27 +8,21 @@ from collections.abc import Iterator
 
 import pytest
 
-from drive_on_bus import DriveOnBus, bus_spec, device
+from drive_on_bus import CLOCK, Driven, DriveOnBus, bus_spec, device, driven_bus
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
-from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import NotPermitted
 
-CLOCK = MonotonicClock()
-Rig = tuple[DriveOnBus, CanBus]
 HOST, HEARTBEAT = 127, 0.05
 
 
 @pytest.fixture
-def rig() -> Iterator[Rig]:
-    spec = bus_spec()
-    with DriveOnBus(spec) as drive:
-        bus = CanBus(spec, "can", CLOCK)
-        yield drive, bus
-        bus.close()
+def rig() -> Iterator[Driven]:
+    with driven_bus() as made:
+        yield made
 
 
 def axis_on(
@@ -47,7 +41,7 @@ def put(drive: DriveOnBus, index: int, sub: int, value: int) -> None:
 @pytest.mark.parametrize("lost", [1, 2, 3])
 @pytest.mark.parametrize("behaviour", [0, 1, 2])
 def test_a_drive_that_watches_is_operational_and_disabled_again(
-    rig: Rig, lost: int, behaviour: int
+    rig: Driven, lost: int, behaviour: int
 ) -> None:
     """Whatever it does at the loss: fault, disable, quick stop; pre-operational, stopped."""
     drive, bus = rig
@@ -75,7 +69,7 @@ def control_words(drive: DriveOnBus) -> list[int]:
     return [int.from_bytes(d[4:6], "little") for d in by_sdo if d[0] != 0x40] + drive.words()
 
 
-def test_a_drive_that_only_says_that_it_watches_is_refused(rig: Rig) -> None:
+def test_a_drive_that_only_says_that_it_watches_is_refused(rig: Driven) -> None:
     """It takes 1016h and reads it back, and then never looks at the clock."""
     drive, bus = rig
     with drive.lock:
@@ -119,7 +113,7 @@ def test_the_proof_disturbs_no_other_node_on_the_bus() -> None:
             bus.close()
 
 
-def test_it_costs_less_than_a_second_with_a_heartbeat_of_100_ms(rig: Rig) -> None:
+def test_it_costs_less_than_a_second_with_a_heartbeat_of_100_ms(rig: Driven) -> None:
     """On a bus of its own the drive's answer comes within its limit of 0.1 s and a poll."""
     _, bus = rig
     watch = WatchSpec(HOST, 0.1, 0.004, True)
@@ -128,7 +122,7 @@ def test_it_costs_less_than_a_second_with_a_heartbeat_of_100_ms(rig: Rig) -> Non
     assert proof.delay < 1.0
 
 
-def test_a_host_that_falls_silent_is_noticed_afterwards(rig: Rig) -> None:
+def test_a_host_that_falls_silent_is_noticed_afterwards(rig: Driven) -> None:
     """The proof leaves the host's own entry armed by its first heartbeat."""
     _, bus = rig
     axis = axis_on(bus)
@@ -141,7 +135,7 @@ def test_a_host_that_falls_silent_is_noticed_afterwards(rig: Rig) -> None:
     assert axis.emergencies[0].code == 0x8130
 
 
-def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Rig) -> None:
+def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Driven) -> None:
     """Unarmed, the drive would go on moving after a host that died at once."""
     drive, bus = rig
     axis = axis_on(bus)

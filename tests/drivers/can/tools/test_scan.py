@@ -10,7 +10,6 @@ import pytest
 from canopen.objectdictionary import ODRecord
 
 from makers_rig import Host, axis_on, generic, opened
-from slave import Nmt, State
 from winchkit.drivers.can.cia402.commission import set_communication
 from winchkit.drivers.can.tools.scan import ScannedNode, scan
 from winchkit.drivers.clock import MonotonicClock
@@ -101,17 +100,6 @@ def test_two_nodes_whose_answers_are_one_frame_are_distinguished_by_their_serial
         twin.sdo.answer = lambda data: answer(data) if data[1:4] == b"\x18\x10\x04" else None  # type: ignore[method-assign]
         found = scanned(bus)
     assert "two nodes have this number: 2 answers to one request (1018h:4)" in found[1].problem
-
-
-def test_a_drive_stopped_by_another_master_is_brought_back() -> None:
-    with opened(generic(1)) as (bus, rig):
-        time.sleep(0.1)
-        rig.inject("stopped by a stranger")
-        assert rig.slaves[0].network.state is Nmt.STOPPED
-        axis = axis_on(bus)
-        axis.commission()
-        assert rig.slaves[0].network.state is Nmt.OPERATIONAL
-        assert rig.slaves[0].power.state is not State.ENABLED
 
 
 def test_a_drive_that_stays_stopped_is_named_as_such() -> None:
