@@ -100,7 +100,7 @@ class CellRate:
 
 @dataclass(frozen=True)
 class CellTare:
-    """A tare or a zero that was set or removed; in the unit of the instrument, None if not known."""
+    """A tare or zero that was set or removed; in the unit of the instrument, None if not known."""
 
     before: float | None = None
     """Mean reading before."""
