@@ -53,6 +53,8 @@ class RemoteStation(Station):
     none is made for :data:`~winchkit.bench.control.dead_man.LIFE_SIGN` (0.5 s): poll ``moving``.
     """
 
+    _is_remote = True
+
     def __init__(
         self,
         connection: socket.socket,
