@@ -7,6 +7,7 @@ node number, by default the only winch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -260,12 +261,8 @@ def lss_list(bench: Wiring) -> Identity | None:
     Identity or None
         None where every device has a number.
     """
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            return line.find_unconfigured()
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        return line.find_unconfigured()
 
 
 def lss_identify(bench: Wiring, identity: Identity | None = None) -> int | None:
@@ -288,13 +285,9 @@ def lss_identify(bench: Wiring, identity: Identity | None = None) -> int | None:
     NoReply
         Where there is no such device.
     """
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            _select(line, identity)
-            node = line.node()
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        _select(line, identity)
+        node = line.node()
     return None if node == UNCONFIGURED else node
 
 
@@ -331,13 +324,9 @@ def lss_set(
     """
     if node is None and bitrate is None and not store:
         raise UsageError("nothing to set; give node, bitrate or store")
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            chosen = _select(line, identity)
-            line.configure(node, bitrate, store=store)
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        chosen = _select(line, identity)
+        line.configure(node, bitrate, store=store)
     return chosen
 
 

@@ -112,31 +112,23 @@ class LssLine:
         with self._errors("ask for the node id"):
             return int(self._master.inquire_node_id())
 
-    def set_node(self, node: int) -> None:
-        """Give the selected device a node id, from its next start of communication on."""
-        check_node(node)
-        with self._errors(f"set the node id {node}"):
-            self._master.configure_node_id(node)
-
-    def set_bitrate(self, bitrate: int) -> None:
-        """Give the selected device a bit rate, from its next start on once stored."""
-        check_bitrate(bitrate)
-        with self._errors(f"set the bit rate {bitrate}"):
-            self._master.configure_bit_timing(BIT_RATES[bitrate])
-
     def configure(self, node: int | None, bitrate: int | None, *, store: bool) -> None:
-        """Set what is given, and let the selected device keep it where ``store`` is true."""
-        if node is not None:
-            self.set_node(node)
-        if bitrate is not None:
-            self.set_bitrate(bitrate)
-        if store:
-            self.store()
+        """Set what is given, and let the selected device keep it where ``store`` is true.
 
-    def store(self) -> None:
-        """Let the selected device keep what was set."""
-        with self._errors("store"):
-            self._master.store_configuration()
+        A node id is valid from its next start of communication on, a bit rate from its next start
+        on once stored.
+        """
+        check_node(node)
+        if node is not None:
+            with self._errors(f"set the node id {node}"):
+                self._master.configure_node_id(node)
+        check_bitrate(bitrate)
+        if bitrate is not None:
+            with self._errors(f"set the bit rate {bitrate}"):
+                self._master.configure_bit_timing(BIT_RATES[bitrate])
+        if store:
+            with self._errors("store"):
+                self._master.store_configuration()
 
     def close(self) -> None:
         """Leave every device in the state in which it takes part in the network."""
