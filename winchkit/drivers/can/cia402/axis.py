@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
-from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
+from winchkit.drivers.can.canopen.nmt import NmtState, state_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.command import Commander, CycleCommand
@@ -214,10 +214,7 @@ class Cia402Axis:
     def nmt_text(self) -> str:
         """NMT state of its heartbeat in words."""
         state = self.heartbeat.state
-        if state is None:
-            return "unknown"
-        # The byte is the drive's own: one that the standard does not know must not end the loop.
-        return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
+        return "unknown" if state is None else state_text(state)
 
     @property
     def alarms(self) -> tuple[int, ...]:
