@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from winchkit.bench.control.cable import CableMap, LineModel
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
 from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import JERK_TIME, Trajectory, plan
@@ -255,7 +255,7 @@ class PlannedMove:
 
     def __init__(
         self,
-        line: LineModel,
+        line: CableMap,
         limits: LimitSpec,
         length: float,
         *,
