@@ -93,9 +93,7 @@ class Cia402Axis:
         self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
         """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
-        self._position = MotorPosition(
-            device.servo, watch.speed, watch.play, response=watch.response, late=watch.late
-        )
+        self._position = MotorPosition(device.servo, watch)
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
@@ -333,11 +331,6 @@ class Cia402Axis:
     def health(self) -> FeedbackHealth:
         """Counts of its TPDOs since it was commissioned."""
         return FeedbackHealth() if self._gathering is None else self._gathering.health
-
-    @property
-    def short_frames(self) -> int:
-        """Frames with fewer bytes than they should have."""
-        return self.health.short + self.emergencies.short
 
     def _enter_mode(self, name: str) -> None:
         self._mode = mode = MODES[name]
