@@ -42,20 +42,6 @@ _COMMANDS = {(0x6040, 0), (0x6060, 0), (0x60B1, 0), (0x60B2, 0)}
 """Control word, mode and offsets: an RPDO with one of them, or the mode's target, is sent."""
 
 
-def loads(spec: BenchSpec) -> dict[str, BusLoad]:
-    """Worst-case load of every CAN bus, by name; raises FileError."""
-    found = {}
-    read = cache(read_dictionary)
-    for name, bus in spec.bus.items():
-        if bus.kind != "can":
-            continue
-        winches = {key: one for key, one in spec.winch.items() if one.servo.bus == name}
-        frames = [frame for key, one in winches.items() for frame in _frames(spec, key, one, read)]
-        beats = dict.fromkeys(("host", *winches), bus.heartbeat)
-        found[name] = load_of(bus.bitrate, spec.cycle, frames, beats)
-    return found
-
-
 def _frames(
     spec: BenchSpec, name: str, winch: WinchWiring, read: Callable[[Path, int], Any]
 ) -> Iterator[FrameKind]:
@@ -343,7 +329,16 @@ def bus_load(bench: str | Path | BenchSpec) -> dict[str, BusLoad]:
     dict of str to Load
         By bus: ``share`` of its bit rate, ``fastest()`` cycle that fits, s, and its frames.
     """
-    return loads(_spec(bench))
+    spec, found = _spec(bench), {}
+    read = cache(read_dictionary)
+    for name, bus in spec.bus.items():
+        if bus.kind != "can":
+            continue
+        winches = {key: one for key, one in spec.winch.items() if one.servo.bus == name}
+        frames = [frame for key, one in winches.items() for frame in _frames(spec, key, one, read)]
+        beats = dict.fromkeys(("host", *winches), bus.heartbeat)
+        found[name] = load_of(bus.bitrate, spec.cycle, frames, beats)
+    return found
 
 
 def _spec(bench: Wiring) -> BenchSpec:
