@@ -123,7 +123,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
         """There are no sockets."""
 
 
-class _Server(asyncio.AbstractServer):
+class _Server:
     """A listening end, which is its own socket object."""
 
     def __init__(
