@@ -29,8 +29,8 @@ from winchkit.estimation.dahl_identification import PulleyRecord, identify_dahl
 from winchkit.estimation.metrics import mean_relative_error, overshoot
 from winchkit.model.pulleys import Bearings, over_pulleys
 from winchkit.model.trajectory import plan
+from winchkit.sim.physics.base import PlantState
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.physics.state import PlantState
 
 Array = np.ndarray
 GRAVITY = 9.80665

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from math import ceil, log10, nan
 
 _FIRST = 1e-5
@@ -54,6 +54,10 @@ class Counters:
     latency: Latency = Latency()
 
 
+COUNTED = tuple(item.name for item in fields(Counters) if item.type == "int")
+"""Names of the counts, without rate and latency."""
+
+
 @dataclass(slots=True)
 class Tally:
     """Counts of one instrument, written by one thread; others read :meth:`counters`."""
@@ -83,18 +87,9 @@ class Tally:
     def counters(self, now: float) -> Counters:
         """The snapshot at a moment."""
         return Counters(
-            self.readings,
-            self.duplicates,
-            self.drops,
-            self.timeouts,
-            self.crc,
-            self.malformed,
-            self.late,
-            self.resynchronised,
-            self.exceptions,
-            self.reconnects,
-            self._rate(now),
-            Latency(self._percentile(0.50), self._percentile(0.99), self._worst),
+            **{name: getattr(self, name) for name in COUNTED},
+            rate=self._rate(now),
+            latency=Latency(self._percentile(0.50), self._percentile(0.99), self._worst),
         )
 
     def _rate(self, now: float) -> float:

@@ -186,10 +186,7 @@ def _values(profile: WinchProfile, term: Term, constants: dict[str, Constant]) -
             continue
         found[p.name] = traced(symbol(name, value))
         own[name] = Constant(name, value, p.unit, source)
-    try:
-        line = Line(profile, [_Recorder().modifier(term, found)])
-        _traced(line, {n: traced([symbol(BEFORE + n), symbol(n)]) for n in INPUTS})
-    except _UNTRACED:
+    if not _is_traced(profile, term, found):
         return term.values
     constants.update(own)
     return found
@@ -199,9 +196,14 @@ def _is_untraced(profile: WinchProfile, term: Term) -> bool:
     """Whether an effect has no formula of one sample and its memory."""
     if term.effect.carry is None:
         return needs_a_step(profile, term)
+    return not _is_traced(profile, term, term.values)
+
+
+def _is_traced(profile: WinchProfile, term: Term, values: Values) -> bool:
+    """Whether an effect can be traced with these values."""
     try:
-        line = Line(profile, [_Recorder().modifier(term, term.values)])
+        line = Line(profile, [_Recorder().modifier(term, values)])
         _traced(line, {n: traced([symbol(BEFORE + n), symbol(n)]) for n in INPUTS})
     except _UNTRACED:
-        return True
-    return False
+        return False
+    return True

@@ -123,16 +123,6 @@ def choose_bench(seed: int) -> SimBench:
     """The demonstration's bench for a seed, which determines the hidden effect and its size.
 
     Consecutive seeds give all benches in turn; sizes are 0.8 to 1.3 times the declared ones.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of effect and size.
-
-    Returns
-    -------
-    SimBench
-        Copy of a shipped bench.
     """
     from winchkit.schema.read import read_simbench
 

@@ -7,8 +7,8 @@ from math import pi
 
 import numpy as np
 
+from winchkit.sim.physics.base import PlantState
 from winchkit.sim.physics.pulley import PreslidingPulleys
-from winchkit.sim.physics.state import PlantState
 
 WRAPS = (pi / 2, pi, pi / 3)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import isfinite, nan
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from winchkit.errors import FileError
 from winchkit.estimation.cable_state import CableEstimator, Sample
+from winchkit.model.line import Line
 
 _FAR = 5e-3
 """Change of the cable length after which length and arm are computed again, m."""
@@ -14,19 +15,6 @@ _SOON = 0.02
 """Time after which tension and memory effects are computed again, s."""
 
 _NEVER = (nan, (nan, nan))
-
-
-class LineModel(Protocol):
-    """Part of ``winchkit.model.line.Line`` that motion control uses."""
-
-    def cable_length(self, motor_angle: float) -> float:
-        """Free length at a motor angle, m."""
-
-    def motor_angle(self, cable_length: float) -> float:
-        """Motor angle (rad) at a free length."""
-
-    def arm(self, motor_angle: float) -> float:
-        """Cable wound in per motor angle, m/rad; positive angle times arm winds in."""
 
 
 class _Linearisation(NamedTuple):
@@ -54,7 +42,7 @@ class CableMap:
     are evaluated with tension and history every 20 ms or 5 mm, whichever comes first.
     """
 
-    def __init__(self, line: LineModel, now: CableEstimator | None = None) -> None:
+    def __init__(self, line: Line, now: CableEstimator | None = None) -> None:
         self._line, self._now = line, now
         self._nearby = _Linearisation()
         self._asked = _NEVER

@@ -6,7 +6,6 @@ import math
 import threading
 from dataclasses import dataclass
 
-from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import (
     Held,
@@ -21,6 +20,7 @@ from winchkit.bench.control.motion import (
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import StopEscalation, StopEvidence, StopMethod
 from winchkit.drivers.can.canopen.nmt import NmtState
+from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, DriveState, RequestedState
 from winchkit.schema.bench import LimitSpec
@@ -79,7 +79,7 @@ class Controller:
     next ``step``.
     """
 
-    def __init__(self, axis: AxisPort, cable: CableMap, limits: LimitSpec) -> None:
+    def __init__(self, axis: Cia402Axis, cable: CableMap, limits: LimitSpec) -> None:
         self.axis = axis
         self.cable = cable
         self.limits = limits

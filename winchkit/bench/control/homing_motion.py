@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 from winchkit.arguments import number
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import Setpoint
+from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.modes import HomingState
 
 _SETTLE = 0.06
@@ -36,21 +36,13 @@ class HomingRequest:
                 number("home", name, value)
 
 
-class HomingAxis(Protocol):
-    """Progress of a homing; implemented by ``Cia402Axis``."""
-
-    @property
-    def homing(self) -> HomingState:
-        """By the drive's newest status word."""
-
-
 class HomingMotion:
     """A motion that the drive makes itself; says how fast the cable goes, for supervision."""
 
     holds = False
     joins = False
 
-    def __init__(self, axis: HomingAxis, cable: CableMap, farthest: float = math.inf) -> None:
+    def __init__(self, axis: Cia402Axis, cable: CableMap, farthest: float = math.inf) -> None:
         """Give up once ``farthest`` (m) of cable have run in the search."""
         self.failure = ""
         """Why it found nothing, in words."""

@@ -7,7 +7,6 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from winchkit.bench.control.observation import WinchInput
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
@@ -16,6 +15,7 @@ from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts, known, pictures
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
+from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import DriveState
@@ -44,32 +44,12 @@ _HEARD_WITHIN = 0.1
 """After the control loop has failed, drives that are still enabled then are left to silence, s."""
 
 
-class BusPort(Protocol):
-    """Interface of a CAN bus to the control loop."""
-
-    @property
-    def fault(self) -> str | None:
-        """Fault that ended the bus; None while it works."""
-
-    def sync(self) -> None:
-        """Send SYNC."""
-
-    def heartbeat(self, node: int, state: int) -> None:
-        """Send the host's heartbeat."""
-
-    def gather(self) -> None:
-        """Collect the RPDOs of this cycle."""
-
-    def send_gathered(self) -> None:
-        """Send the collected RPDOs."""
-
-
 class ControlLoop:
     """Runs ``step`` once a cycle on its own thread, or as its owner calls it in a test."""
 
     def __init__(
         self,
-        buses: Sequence[tuple[BusPort, int, float]],
+        buses: Sequence[tuple[CanBus, int, float]],
         winches: Mapping[str, WinchParts],
         supervisor: Supervisor,
         clock: Clock,

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
-from winchkit.bench.control.cable import CableMap, LineModel
+from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
 from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import JERK_TIME, Trajectory, plan
@@ -172,7 +172,6 @@ class Jog:
         self.dead_man = dead_man
         self._cable, self._limits = cable, limits
         self._ramp = Ramp(limits.acceleration)
-        self._lag = limits.acceleration * limits.response_time
         self._angle = self._last = 0.0
         self.request(winding_speed)
 
@@ -198,17 +197,22 @@ class Jog:
         return _new(Setpoint, (velocity, self._angle, speed, not live and speed == 0.0, False))
 
     def _within(self, requested: float, length: float) -> float:
-        """Commanded speed, limited to the one from which the winch stops before a length limit.
-
-        The drive's speed lags behind by up to the response time, in which the cable runs on.
-        """
+        """Commanded speed, limited to the one from which the winch stops before a length limit."""
         if self._limits.length is None:
             return requested
         low, high = self._limits.length
-        room = max(0.0, (length - low if requested > 0 else high - length) - _MARGIN)
-        lag = self._lag
-        fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
+        room = (length - low if requested > 0 else high - length) - _MARGIN
+        fastest = fastest_within(room, self._limits)
         return math.copysign(fastest, requested) if fastest < abs(requested) else requested
+
+
+def fastest_within(room: float, limits: LimitSpec) -> float:
+    """Largest speed (m/s) from which a winch stops within the room (m).
+
+    The drive's speed lags behind by up to the response time, in which the cable runs on.
+    """
+    lag = limits.acceleration * limits.response_time
+    return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
 
 class RunDown:
@@ -251,7 +255,7 @@ class PlannedMove:
 
     def __init__(
         self,
-        line: LineModel,
+        line: CableMap,
         limits: LimitSpec,
         length: float,
         *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum, Flag
 from typing import Any, NamedTuple
@@ -127,14 +127,6 @@ class WinchSnapshots(Mapping[str, WinchSnapshot]):
 
     def __repr__(self) -> str:
         return repr(self._all())
-
-    def items(self) -> ItemsView[str, WinchSnapshot]:
-        """Names and snapshots."""
-        return self._all().items()
-
-    def values(self) -> ValuesView[WinchSnapshot]:
-        """The snapshots."""
-        return self._all().values()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Ramp, Setpoint
+from winchkit.bench.control.motion import Ramp, Setpoint, fastest_within
 from winchkit.errors import UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.profiles.winch import CableSpec
@@ -91,12 +91,6 @@ def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) 
             'gain is computed; give the stiffness, such as "20 kN/m"'
         )
     return axial / span
-
-
-def fastest_within(room: float, limits: LimitSpec) -> float:
-    """Largest speed (m/s) from which the drive, with its lag, stops within the room (m)."""
-    lag = limits.acceleration * limits.response_time
-    return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
 
 class BrokenCable:

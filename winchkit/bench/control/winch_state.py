@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
-from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, PredictedTension
 from winchkit.bench.control.observation import Instrumented, WinchInput
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
+from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.state_machine import DriveState
-from winchkit.drivers.reading import InstrumentReading
+from winchkit.drivers.reading import InstrumentReading, Sensor
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
 from winchkit.schema.profiles.winch import CableSpec
@@ -30,29 +30,14 @@ _NOTHING = AxisFeedback(math.nan, 0, DriveState.UNKNOWN, 0, math.nan, math.nan, 
 """Feedback of a drive that has sent nothing yet."""
 
 
-class SensorPort(Protocol):
-    """Interface of an instrument to the control loop."""
-
-    max_age: float
-    """A reading older than this is stale, s."""
-
-    @property
-    def latest(self) -> InstrumentReading | None:
-        """Newest reading."""
-
-    @property
-    def problem(self) -> ConnectionLost | None:
-        """Fault that prevents new readings; None without one."""
-
-
 @dataclass
 class WinchParts:
     """Parts of one winch in the control loop."""
 
-    axis: AxisPort
+    axis: Cia402Axis
     cable: CableMap
     controller: Controller
-    sensors: Mapping[str, SensorPort] = field(default_factory=dict)
+    sensors: Mapping[str, Sensor] = field(default_factory=dict)
     """By role: cell, load, length, temperature."""
     frozen: FrozenCell | None = None
     """The test of its load cell, if it has one."""

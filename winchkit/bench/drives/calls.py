@@ -7,6 +7,7 @@ node number, by default the only winch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -39,20 +40,6 @@ from winchkit.schema.read import read_bench
 
 _COMMANDS = {(0x6040, 0), (0x6060, 0), (0x60B1, 0), (0x60B2, 0)}
 """Control word, mode and offsets: an RPDO with one of them, or the mode's target, is sent."""
-
-
-def loads(spec: BenchSpec) -> dict[str, BusLoad]:
-    """Worst-case load of every CAN bus, by name; raises FileError."""
-    found = {}
-    read = cache(read_dictionary)
-    for name, bus in spec.bus.items():
-        if bus.kind != "can":
-            continue
-        winches = {key: one for key, one in spec.winch.items() if one.servo.bus == name}
-        frames = [frame for key, one in winches.items() for frame in _frames(spec, key, one, read)]
-        beats = dict.fromkeys(("host", *winches), bus.heartbeat)
-        found[name] = load_of(bus.bitrate, spec.cycle, frames, beats)
-    return found
 
 
 def _frames(
@@ -260,12 +247,8 @@ def lss_list(bench: Wiring) -> Identity | None:
     Identity or None
         None where every device has a number.
     """
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            return line.find_unconfigured()
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        return line.find_unconfigured()
 
 
 def lss_identify(bench: Wiring, identity: Identity | None = None) -> int | None:
@@ -288,13 +271,9 @@ def lss_identify(bench: Wiring, identity: Identity | None = None) -> int | None:
     NoReply
         Where there is no such device.
     """
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            _select(line, identity)
-            node = line.node()
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        _select(line, identity)
+        node = line.node()
     return None if node == UNCONFIGURED else node
 
 
@@ -331,13 +310,9 @@ def lss_set(
     """
     if node is None and bitrate is None and not store:
         raise UsageError("nothing to set; give node, bitrate or store")
-    with free_bus(_spec(bench)) as bus:
-        line = LssLine(bus)
-        try:
-            chosen = _select(line, identity)
-            line.configure(node, bitrate, store=store)
-        finally:
-            line.close()
+    with free_bus(_spec(bench)) as bus, closing(LssLine(bus)) as line:
+        chosen = _select(line, identity)
+        line.configure(node, bitrate, store=store)
     return chosen
 
 
@@ -354,7 +329,16 @@ def bus_load(bench: str | Path | BenchSpec) -> dict[str, BusLoad]:
     dict of str to Load
         By bus: ``share`` of its bit rate, ``fastest()`` cycle that fits, s, and its frames.
     """
-    return loads(_spec(bench))
+    spec, found = _spec(bench), {}
+    read = cache(read_dictionary)
+    for name, bus in spec.bus.items():
+        if bus.kind != "can":
+            continue
+        winches = {key: one for key, one in spec.winch.items() if one.servo.bus == name}
+        frames = [frame for key, one in winches.items() for frame in _frames(spec, key, one, read)]
+        beats = dict.fromkeys(("host", *winches), bus.heartbeat)
+        found[name] = load_of(bus.bitrate, spec.cycle, frames, beats)
+    return found
 
 
 def _spec(bench: Wiring) -> BenchSpec:

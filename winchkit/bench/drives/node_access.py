@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from winchkit.bench.cells.instruments import device_of, eds_of
+from winchkit.bench.ownership import Ownership
 from winchkit.bench.remote.client import RemoteStation, attach
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
@@ -16,7 +17,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import fitting_device
 from winchkit.drivers.can.canopen.node import Objects, SdoNode, read_dictionary
 from winchkit.drivers.can.tools.scan import RawNode, ScannedNode, identity_of, named_after, scan
-from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
@@ -44,29 +45,25 @@ class Node:
         return eds_of(self.device)
 
 
-def bus_only(
-    interface: str, channel: str, bitrate: int, port: int | None, bus: str = "can"
-) -> BenchSpec:
+def bus_only(interface: str, channel: str, bitrate: int, port: int | None) -> BenchSpec:
     """A wiring of nothing but a CAN bus."""
     spec = BusSpec("can", interface=interface, channel=channel, bitrate=bitrate, port=port)
-    return BenchSpec(f"{interface} {channel}", {}, {bus: spec})
+    return BenchSpec(f"{interface} {channel}", {}, {"can": spec})
 
 
-def nodes_on(spec: BenchSpec, clock: Clock | None = None) -> list[ScannedNode]:
+def nodes_on(spec: BenchSpec) -> list[ScannedNode]:
     """Scan every CAN bus of a bench; the owner does it where there is one.
 
     Raises FileError, ConnectionLost, NotPermitted.
     """
     remote = attach(spec)
     if remote is not None:
-        try:
+        with remote:
             return remote.scan()
-        finally:
-            remote.close()
     found = []
     with _owning(spec):
         for name in _can_buses(spec):
-            with _open(spec, name, clock or MonotonicClock()) as bus:
+            with _open(spec, name) as bus:
                 found += scan(bus, spec.bus[name], bus.clock, _LISTEN)
     return named_after(spec, found)
 
@@ -78,7 +75,6 @@ def drive_at(
     *,
     writes: bool = False,
     device: str | None = None,
-    clock: Clock | None = None,
 ) -> Iterator[Node]:
     """A drive by its winch's name or its node number (the only winch where ``who`` is None).
 
@@ -97,21 +93,19 @@ def drive_at(
         remote.close()
         remote = None
     if remote is None:
-        with _owning(spec), _open(spec, bus_name, clock or MonotonicClock()) as bus:
+        with _owning(spec), _open(spec, bus_name) as bus:
             found = device_of(spec, wiring.servo) if wiring else _recognised(bus, node, device)
             port = SdoNode(bus, node, eds_of(found))
             objects = Objects(port, port.dictionary)
             yield Node(name, node, bitrate, found, objects, wiring)
         return
-    try:
+    with remote:
         if wiring is None:
             raise UsageError(f"node {node} is no winch of the bench that another process owns")
         _check_reading(spec, writes)
         found = device_of(spec, wiring.servo)
         objects = Objects(_RemotePort(remote, winch), read_dictionary(eds_of(found), node))
         yield Node(name, node, bitrate, found, objects, wiring)
-    finally:
-        remote.close()
 
 
 def _check_reading(spec: BenchSpec, writes: bool) -> None:
@@ -141,14 +135,14 @@ def declared_drive(spec: BenchSpec, who: str | None) -> DeclaredDrive:
 
 
 @contextmanager
-def free_bus(spec: BenchSpec, clock: Clock | None = None) -> Iterator[CanBus]:
+def free_bus(spec: BenchSpec) -> Iterator[CanBus]:
     """The only CAN bus of a bench without owner; raises NotPermitted where it has one."""
     names = _can_buses(spec)
     if len(names) != 1:
         raise UsageError(
             f"'{spec.name}' has {len(names)} CAN buses; name one by --interface and --channel"
         )
-    with _owning(spec), _open(spec, names[0], clock or MonotonicClock()) as bus:
+    with _owning(spec), _open(spec, names[0]) as bus:
         yield bus
 
 
@@ -222,19 +216,9 @@ def _can_buses(spec: BenchSpec) -> list[str]:
     return [name for name, bus in spec.bus.items() if bus.kind == "can"]
 
 
-@contextmanager
-def _owning(spec: BenchSpec) -> Iterator[None]:
-    ownership = own(spec, client_name())
-    try:
-        yield
-    finally:
-        ownership.close()
+def _owning(spec: BenchSpec) -> closing[Ownership]:
+    return closing(own(spec, client_name()))
 
 
-@contextmanager
-def _open(spec: BenchSpec, name: str, clock: Clock) -> Iterator[CanBus]:
-    bus = CanBus(spec.bus[name], name, clock)
-    try:
-        yield bus
-    finally:
-        bus.close()
+def _open(spec: BenchSpec, name: str) -> closing[CanBus]:
+    return closing(CanBus(spec.bus[name], name, MonotonicClock()))

@@ -21,10 +21,10 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_CLOEXEC", "O_NON
 class RecordFile:
     """One record, of text; every method but :meth:`close` raises OSError."""
 
-    def __init__(self, path: str, pages: int = 2) -> None:
-        """Take the path, and the least size in pages; the file is opened later."""
+    def __init__(self, path: str) -> None:
+        """Take the path; the file is opened later."""
         self.path = path
-        self.size = pages * _PAGE
+        self.size = 2 * _PAGE
         self._descriptor: int | None = None
         self._lock = threading.Lock()
 

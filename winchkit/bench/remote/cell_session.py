@@ -18,7 +18,7 @@ from winchkit.schema.bench import BenchSpec
 
 
 @contextmanager
-def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[BenchCells]:
+def at_cells(bench_file: str | Path) -> Iterator[BenchCells]:
     """The instruments of a bench, by its owner or as its owner.
 
     Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client.
@@ -28,24 +28,22 @@ def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Ben
     spec = read_bench(bench_file)
     remote = attach(spec)
     if remote is not None:
-        try:
+        with remote:
             yield RemoteCells(spec, remote)
-        finally:
-            remote.close()
         return
-    with own_cells(spec, "cell", clock) as desk:
+    with own_cells(spec, "cell") as desk:
         yield LocalCells(desk)
 
 
 @contextmanager
-def own_cells(spec: BenchSpec, client: str, clock: Clock | None = None) -> Iterator[CellDesk]:
+def own_cells(spec: BenchSpec, client: str) -> Iterator[CellDesk]:
     """The instruments of a bench, opened here as its owner.
 
     Raises NotPermitted where another process owns it, FileError, ConnectionLost.
     """
     with ExitStack() as stack:
         stack.callback(own(spec, client_name(client)).close)
-        yield _opened(spec, clock or MonotonicClock(), stack)
+        yield _opened(spec, MonotonicClock(), stack)
 
 
 def _opened(spec: BenchSpec, clock: Clock, stack: ExitStack) -> CellDesk:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 
 from winchkit.bench.ownership import Ownership, connect_to_owner
-from winchkit.bench.remote.client import RemoteStation
+from winchkit.bench.remote.requests import ANSWER_TIME, Requests
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
@@ -64,8 +64,9 @@ def _hand_over(spec: BenchSpec, name: str) -> bool:
         connection = connect_to_owner(spec)
         if connection is None:
             return False
-        with RemoteStation(connection, name=name) as station:
-            station.hand_over()
+        with closing(Requests(connection, ANSWER_TIME)) as requests:
+            requests.call("introduce", name, False)
+            requests.call("hand_over")
     except ConnectionLost:
         return False
     return True

@@ -1,316 +1,65 @@
 """The operations of a bench: one table, from which client and server are derived.
 
-A station in the process of the bench's owner carries them out, one elsewhere requests them.
+An operation has its signature, its description and what the owner's process does here, those that
+move the winches in ``motion_operations``. Where that needs modules which no client loads, it is in
+``station``.
 """
 
 # mypy: disable-error-code="empty-body"
-# An operation has no body here: :func:`_operation` requests it.
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Mapping
-from functools import wraps
-from typing import Any, TypeVar, cast
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
-from winchkit.bench.control.dead_man import DEAD_MAN
-from winchkit.drivers.clock import Clock
+from winchkit.bench.control.snapshot import to_dict
+from winchkit.bench.remote.motion_operations import MotionStation
+from winchkit.bench.remote.operation import operation
+from winchkit.errors import UsageError
 
-_Method = TypeVar("_Method", bound=Callable[..., Any])
-
-OPERATIONS: dict[str, bool] = {}
-"""Whether it begins or extends a motion, by operation; such a request is refused where it has been
-on its way for too long."""
-
-
-def _operation(*, begins: bool = False) -> Callable[[_Method], _Method]:
-    """An operation, requested with all its arguments where a station does not define it."""
-
-    def requested(method: _Method) -> _Method:
-        name, signature = method.__name__, inspect.signature(method)
-        OPERATIONS[name] = begins
-
-        @wraps(method)
-        def request(station: Station, *arguments: Any, **named: Any) -> Any:
-            asked = signature.bind(station, *arguments, **named)
-            asked.apply_defaults()
-            return station._request(name, *asked.args[1:], **asked.kwargs)
-
-        return cast(_Method, request)
-
-    return requested
+if TYPE_CHECKING:
+    from winchkit.bench.recording.recorder import Recorder
+    from winchkit.bench.remote.programme_run import ProgrammeRun
+    from winchkit.drivers.can.bus.frame_tap import SeenFrame
+    from winchkit.drivers.reading import Sensor
 
 
-class Station:
-    """An operator's place at a bench. Closing it ends what it has started."""
+class Station(MotionStation):
+    """An operator's place at a bench: its motions, state, logs, programmes and devices."""
 
-    def _request(self, operation: str, *arguments: Any, **named: Any) -> Any:
-        raise NotImplementedError(operation)
+    _recorder: Recorder | None = None
+    _programme: ProgrammeRun | None = None
 
-    @property
-    def clock(self) -> Clock:
-        """Clock of the bench, on which a client waits."""
-
-    @_operation()
+    @operation()
     def names(self) -> list[str]:
         """Winches there are."""
+        return list(self._bench.winch)
 
-    @_operation()
+    @operation()
     def status(self) -> dict[str, Any]:
         """Newest snapshot and the health of the CAN buses, as JSON has them."""
+        buses = {name: asdict(item) for name, item in self._bench.bus_health.items()}
+        for item in buses.values():
+            item["state"] = item["state"].value
+        return {
+            **to_dict(self._bench.snapshot),
+            "cycle_time": {
+                "period": self._bench.loop.cycle,
+                "counts": list(self._bench.loop.cycle_counts),
+            },
+            "bus": buses,
+            "tare": {
+                name: _tare(winch.sensors["cell"])
+                for name, winch in self._bench.winch.items()
+                if "cell" in winch.sensors
+            },
+            "realtime": [asdict(item) for item in self._bench.realtime.items],
+            "not_commissioned": self._bench.not_commissioned,
+            "owner": self._bench.commanders.owner.name,
+            "clients": [client.name for client in self._bench.stations.clients],
+        }
 
-    @_operation(begins=True)
-    def jog(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-        since: float | None = None,
-    ) -> None:
-        """Begin to move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
-
-        :meth:`refresh` within that time keeps it going; one that is under way is not started again.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        pay_out, wind_in : float
-            Cable speed, m/s, positive; exactly one is given.
-        hold : float
-            Time of motion without a refresh, s, at most 1.
-        since : float, optional
-            When the operator was seen to ask for it, s on :attr:`clock`; by default now. The time
-            of motion counts from then.
-        """
-
-    @_operation(begins=True)
-    def refresh(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-    ) -> None:
-        """Keep a jog or a held tension going for ``hold`` seconds more, a jog at another speed too.
-
-        Raises MotionError where it has ended, which a refresh never begins again: its time was
-        over (this process was suspended, or too slow), or somebody stopped it.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", as of a platform that is held, or None for the only one.
-        pay_out, wind_in : float, optional
-            Another speed of a jog, m/s, positive; at most one is given.
-        hold : float
-            Time of motion without another refresh, s, at most 1.
-        """
-
-    @_operation()
-    def release(self, winch: str | None) -> None:
-        """End a jog or a held tension by a ramp now, instead of when its ``hold`` is over.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", as of a platform that is held, or None for the only one.
-        """
-
-    @_operation(begins=True)
-    def step(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        since: float | None = None,
-    ) -> None:
-        """Start to pay out or wind in a length (m, positive) of cable.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        pay_out, wind_in : float
-            Length, m, positive; exactly one is given.
-        speed : float, optional
-            m/s; by default the limit of the winch.
-        since : float, optional
-            When the operator was seen to ask for it, s on :attr:`clock`; by default now.
-        """
-
-    @_operation(begins=True)
-    def move(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        to: float | None = None,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start a move to a cable length, or by a length (m, positive) paid out or wound in.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all" to move all as one, or None for the only one.
-        to : float, optional
-            Cable length, m.
-        pay_out, wind_in : float
-            Length, m, positive; exactly one of the three is given.
-        speed, acceleration : float, optional
-            m/s and m/s²; by default the limits of the winch.
-        """
-
-    @_operation(begins=True)
-    def move_pose(
-        self,
-        change: Mapping[str, float],
-        relative: bool,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start to move the platform of the robot on a line.
-
-        Parameters
-        ----------
-        change : mapping of str to float
-            Some of x, y, z (m), roll, pitch, yaw (rad); the others keep their values.
-        relative : bool
-            Whether they are added to those of the present pose.
-        speed, acceleration : float, optional
-            m/s and m/s²; by default the limits of the bench's ``[robot]``.
-        """
-
-    @_operation()
-    def pose(self) -> dict[str, float]:
-        """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
-
-    @_operation(begins=True)
-    def hold_tension(
-        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
-    ) -> None:
-        """Begin to keep the tension of a winch for ``hold`` seconds; :meth:`refresh` goes on.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        tension : float
-            At the platform end, N.
-        hold : float
-            Time without a refresh, s, at most 1.
-        bounds : mapping of str to float
-            ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
-            ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
-        """
-
-    @_operation(begins=True)
-    def hold_platform(
-        self,
-        preload: float | Mapping[str, float] | None,
-        pose: Mapping[str, float] | None,
-        hold: float,
-        bounds: Mapping[str, float],
-    ) -> None:
-        """Begin to hold forces and pose of the robot's platform for ``hold`` seconds.
-
-        ``refresh("all")`` goes on.
-
-        Parameters
-        ----------
-        preload : float or mapping of str to float, optional
-            As of ``bench.robot.hold``, N.
-        pose : mapping of str to float, optional
-            Some of x, y, z (m), roll, pitch, yaw (rad) to be held by the tracker; the others are
-            those of the present pose.
-        hold : float
-            Time without a refresh, s, at most 1.
-        bounds : mapping of str to float
-            ``travel``, m, ``speed``, m/s, and ``axial_stiffness``, N, of the cables, as of
-            ``bench.robot.hold``; each may be left out.
-        """
-
-    @_operation()
-    def platform_held(self) -> dict[str, Any]:
-        """Set-point and measured values of what the platform holds, or held last.
-
-        Returns
-        -------
-        dict
-            By cable ``force`` and ``measured``, N, and ``missing``, of the forces that balance each
-            other; ``position_error``, m, and ``rotation_error``, rad. None for what is not held.
-        """
-
-    @_operation()
-    def take_over(self, winch: str | None) -> None:
-        """Command a winch that another client commands; its motion ends by a ramp.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", or None for the only one.
-        """
-
-    @_operation()
-    def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", or None for the only one.
-
-        Returns
-        -------
-        bool
-            Whether a motion is under way; raises what stopped it, and who has taken it over.
-        """
-
-    @_operation(begins=True)
-    def home(
-        self, winch: str | None, method: int | None, at: float | None, speed: float | None
-    ) -> None:
-        """Start to home a winch.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        method : int or None
-            Homing method of CiA 402 (6098h); None moves nothing.
-        at : float or None
-            Cable length at the zero, m.
-        speed : float or None
-            Speed of the search, m/s.
-        """
-
-    @_operation()
-    def homing(self) -> bool:
-        """Whether the homing is under way, and lead it on; raises what ended it."""
-
-    @_operation()
-    def stop(self) -> None:
-        """Quick-stop every winch; returns at rest."""
-
-    @_operation()
-    def reset(self) -> list[str]:
-        """Clear trips and faults; returns what was cleared, in words."""
-
-    @_operation()
+    @operation()
     def tare(self, winch: str | None) -> float:
         """Tare a load cell.
 
@@ -324,8 +73,9 @@ class Station:
         float
             Tension after it, N.
         """
+        return self._bench.named(winch).tare()
 
-    @_operation()
+    @operation()
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
         """Log to a file in the owner's process.
 
@@ -338,20 +88,22 @@ class Station:
         replace : bool
             Remove an earlier log of that name.
         """
+        self.end_log()
+        self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
 
-    @_operation()
+    @operation()
     def log_rows(self) -> int:
         """Rows written so far."""
 
-    @_operation()
+    @operation()
     def end_log(self) -> int:
         """Finish the log; returns its rows."""
 
-    @_operation()
+    @operation()
     def counters(self) -> dict[str, dict[str, Any]]:
         """Counts by instrument (``A.cell``), and for the log of this station."""
 
-    @_operation()
+    @operation()
     def trip_history(self) -> dict[str, Any] | None:
         """The cycles around the trip that is not reset yet; None without one.
 
@@ -363,8 +115,9 @@ class Station:
             angle, velocity and torque, tension, load, length of its instrument, cable length and
             speed of the drive, and commanded speed by winch, SI; ``events``: time and words.
         """
+        return self._bench.trip_history.to_dict(self._bench.snapshot)
 
-    @_operation()
+    @operation()
     def frames(self) -> dict[str, dict[str, Any]]:
         """Frames of each CAN bus by name, collected from the first call on while it is called.
 
@@ -374,8 +127,15 @@ class Station:
             ``newest``: number, time (s), identifier and bytes in hexadecimal of each identifier's
             newest frame; ``last``: time, identifier and bytes of the last 200 frames.
         """
+        return {
+            name: {
+                "newest": [[count, *_frame(item)] for count, item in tap.newest],
+                "last": [_frame(item) for item in tap.last],
+            }
+            for name, tap in self._bench.frames().items()
+        }
 
-    @_operation(begins=True)
+    @operation(begins=True)
     def start_programme(
         self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
     ) -> None:
@@ -393,7 +153,7 @@ class Station:
             Write over earlier runs of a programme of this name.
         """
 
-    @_operation()
+    @operation()
     def programme(self) -> dict[str, Any] | None:
         """Where this station's programme is; None where it started none.
 
@@ -402,16 +162,22 @@ class Station:
         dict or None
             As of ``winchkit.bench.remote.programme_run.ProgrammeRun.state``.
         """
+        return None if self._programme is None else self._programme.state()
 
-    @_operation(begins=True)
+    @operation(begins=True)
     def answer_programme(self) -> None:
         """Answer the programme's request as done; raises UsageError where there is no request."""
+        if self._programme is None:
+            raise UsageError("no programme is under way")
+        self._programme.answer()
 
-    @_operation()
+    @operation()
     def end_programme(self) -> None:
         """End this station's programme by a ramp; returns at rest."""
+        if self._programme is not None:
+            self._programme.end()
 
-    @_operation()
+    @operation()
     def read_object(self, winch: str | None, index: int, sub: int) -> str | None:
         """Bytes of an object of a winch's drive.
 
@@ -427,12 +193,16 @@ class Station:
         str or None
             Its bytes, little-endian, in hexadecimal; None for an object that the drive lacks.
         """
+        name = self._bench.named(winch).name
+        data = self._bench.axes[name].objects.upload_if_there(index, sub)
+        return None if data is None else data.hex()
 
-    @_operation()
+    @operation()
     def scanned(self) -> list[dict[str, Any]]:
         """Who is on the buses, as JSON has it."""
+        return [asdict(item) for item in self._bench.scan()]
 
-    @_operation()
+    @operation()
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words.
 
@@ -454,5 +224,15 @@ class Station:
             Result of the task, as JSON has it.
         """
 
-    def close(self) -> None:
-        """Stop what was started here, finish the log."""
+
+def _tare(cell: Sensor) -> float | None:
+    """Gross less net value, by the device and the host together, N; None without a measurement."""
+    reading = cell.latest
+    if reading is None or not reading.quality.usable:
+        return None
+    return reading.gross - reading.value
+
+
+def _frame(frame: SeenFrame) -> list[Any]:
+    """Time, identifier and bytes in hexadecimal."""
+    return [round(frame.time, 4), frame.identifier, frame.data.hex()]

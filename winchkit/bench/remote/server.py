@@ -17,7 +17,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.dead_man import LIFE_SIGN, remaining
 from winchkit.bench.ownership import digest_of, listen, log_path
 from winchkit.bench.remote.identity import Client, LifeSign
-from winchkit.bench.remote.operations import OPERATIONS
+from winchkit.bench.remote.operation import OPERATIONS
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import (
     ConnectionLost,

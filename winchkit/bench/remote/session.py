@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, TypeVar
 from winchkit.arguments import path_of
 from winchkit.bench.drives.set_up_progress import tell_hardware
 from winchkit.bench.ownership import digest_of, unless_stopped
-from winchkit.bench.remote.client import OwnerGone, RemoteStation
+from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.client import attach as attach_to_owner
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.process import can_spawn, spawn
+from winchkit.bench.remote.requests import OwnerGone
 from winchkit.errors import ConnectionLost, MotionError, NotPermitted, UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
 

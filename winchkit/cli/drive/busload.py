@@ -32,11 +32,10 @@ def command(ctx: click.Context, bench: str) -> None:
     than 70 % of a bus, the rest is for SDO, emergencies and repeats. Opens nothing. Ends with 1
     when a bus carries more than that.
     """
-    from winchkit.bench.drives.calls import loads
+    from winchkit.bench.drives.calls import bus_load
     from winchkit.drivers.can.bus.load import ADVISED
-    from winchkit.schema.read import read_bench
 
-    found = loads(read_bench(bench))
+    found = bus_load(bench)
     lines = (line for name, load in found.items() for line in _lines(name, load))
     tell({"advised": ADVISED, "bus": _trees(found)}, lines)
     ctx.exit(0 if all(load.share <= ADVISED for load in found.values()) else 1)

@@ -11,22 +11,14 @@ import struct
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from winchkit.drivers.counters import COUNTED
 from winchkit.drivers.publisher import Sampled
 from winchkit.drivers.reading import Quality
 
 _HEAD = struct.Struct("<BI")
 _READING = struct.Struct("<H3dI4d")
 
-COUNTS = (
-    "drops",
-    "timeouts",
-    "crc",
-    "malformed",
-    "late",
-    "resynchronised",
-    "exceptions",
-    "reconnects",
-)
+COUNTS = tuple(name for name in COUNTED if name not in ("readings", "duplicates"))
 """What is counted on the line; readings and duplicates are counted where they are judged."""
 
 

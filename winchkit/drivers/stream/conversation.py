@@ -15,7 +15,7 @@ from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import FrameType, ParsedFrame
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.parser import StreamFrame, StreamParser
-from winchkit.drivers.stream.port import Chunk, Port
+from winchkit.drivers.stream.port import Chunk, SerialPort
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.stream import AskSpec
@@ -35,7 +35,7 @@ _FRESH_TRIES = 4
 class Conversation:
     """One open line; its coroutines raise one of our errors."""
 
-    def __init__(self, port: Port, spec: BusSpec, name: str, clock: Clock) -> None:
+    def __init__(self, port: SerialPort, spec: BusSpec, name: str, clock: Clock) -> None:
         """``name`` is the bus's."""
         self.port = port
         self.was_silent = False

@@ -10,14 +10,14 @@ from winchkit.drivers.reading import Sensor
 from winchkit.drivers.sharing import RECONNECT, RETRY, LineShare, next_of
 from winchkit.drivers.stream.conversation import Conversation, exchange_time
 from winchkit.drivers.stream.instrument import StreamInstrument
-from winchkit.drivers.stream.port import Port, open_serial
+from winchkit.drivers.stream.port import SerialPort, open_serial
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply
 from winchkit.schema.bench import BusSpec
 
 _LISTEN = 0.05
 """A command waits at most this long for a line that listens, s."""
 
-Opener = Callable[[BusSpec, str, Clock], Awaitable[Port]]
+Opener = Callable[[BusSpec, str, Clock], Awaitable[SerialPort]]
 
 
 class StreamLine:

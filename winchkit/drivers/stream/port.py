@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, event_of, thread_of
@@ -33,25 +33,7 @@ class Chunk(NamedTuple):
     time: float
 
 
-class Port(Protocol):
-    """An open serial port."""
-
-    latency: float
-    """How late bytes may be handed over, s."""
-    note: str
-    """What is to be said about the port, empty where nothing is."""
-
-    async def read(self, until: float) -> Chunk | None:
-        """Return the next bytes, None when there are none ``until`` then; raises ConnectionLost."""
-
-    def write(self, data: bytes) -> None:
-        """Send bytes; raises ConnectionLost."""
-
-    def close(self) -> None:
-        """Close the port."""
-
-
-async def open_serial(spec: BusSpec, name: str, clock: Clock) -> Port:
+async def open_serial(spec: BusSpec, name: str, clock: Clock) -> SerialPort:
     """Open a port of the machine, or any URL of pyserial; raises ConnectionLost.
 
     It is opened on another thread: a network port that does not answer must not stop the others.
@@ -68,6 +50,7 @@ class SerialPort:
         """Begin to read; made within the loop that reads."""
         self.where = where
         self.latency, self.note = set_latency(port)
+        """How late bytes may be handed over, s, and a remark on the port; empty without one."""
         self._serial = opened
         self._clock = clock
         self._loop = asyncio.get_running_loop()

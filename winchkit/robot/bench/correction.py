@@ -17,9 +17,9 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.dead_man import DeadMan
-from winchkit.bench.control.motion import Setpoint
+from winchkit.bench.control.motion import Setpoint, fastest_within
 from winchkit.bench.control.snapshot import Trip
-from winchkit.bench.control.tension_control import UsedUp, fastest_within
+from winchkit.bench.control.tension_control import UsedUp
 from winchkit.schema.bench import LimitSpec
 
 Latch = Callable[[Trip], None]

@@ -123,7 +123,7 @@ class SimulatedEventLoop(base_events.BaseEventLoop):
         """There are no sockets."""
 
 
-class _Server(asyncio.AbstractServer):
+class _Server:
     """A listening end, which is its own socket object."""
 
     def __init__(
@@ -145,24 +145,6 @@ class _Server(asyncio.AbstractServer):
         """Stop listening."""
         self._clock.listeners.pop(self._address, None)
 
-    def is_serving(self) -> bool:
-        """Whether it listens."""
-        return self._address in self._clock.listeners
-
-    def get_loop(self) -> SimulatedEventLoop:
-        """The loop on which it serves."""
-        return self.loop
-
-    async def start_serving(self) -> None:
-        """Do nothing, since it serves already."""
-
-    async def serve_forever(self) -> None:
-        """Serve until cancelled."""
-        await self.loop.create_future()
-
-    async def wait_closed(self) -> None:
-        """Return at once."""
-
 
 class _Transport(asyncio.Transport):
     """One end of a connection; bytes arrive at the other end in order."""
@@ -174,18 +156,6 @@ class _Transport(asyncio.Transport):
         self.is_server = False
         self._clock = clock
         self._closed = False
-
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return the default: a connection without a socket has no such information."""
-        return default
-
-    def set_protocol(self, protocol: Any) -> None:
-        """Set the protocol that receives data."""
-        self.protocol = protocol
-
-    def get_protocol(self) -> Any:
-        """The protocol that receives data."""
-        return self.protocol
 
     def is_closing(self) -> bool:
         """Whether it is closed."""

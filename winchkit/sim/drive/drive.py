@@ -16,7 +16,7 @@ from winchkit.sim.drive.motion import DriveMotion
 from winchkit.sim.drive.nmt import Heartbeats, NodeState, emergency_frame
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.pdo import Pdos
-from winchkit.sim.drive.power import PowerStage, PowerState
+from winchkit.sim.drive.power import PowerCommand, PowerStage, PowerState
 from winchkit.sim.drive.sdo import SdoServer
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.drive.shaft import HoldingBrake, Shaft
@@ -256,7 +256,7 @@ class SimDrive:
             self._line.storm = True
         elif kind == "enable input open":
             self._inhibited = True
-            self._power.disable_voltage()
+            self._power.obey(PowerCommand.DISABLE_VOLTAGE)
         elif kind == "silence":
             self._line.cut = True
         else:
@@ -292,7 +292,7 @@ class SimDrive:
         if state is NodeState.STOPPED:
             self._abort_connection()
         elif before is NodeState.OPERATIONAL and self._quirks.stops_outside_operational:
-            self._power.shut_down()
+            self._power.obey(PowerCommand.SHUTDOWN)
 
     def _reset_communication(self, now: float) -> None:
         self._abort_connection()

@@ -151,31 +151,20 @@ class PowerStage:
         command = command_of(word)
         if command is PowerCommand.ENABLE and self._ramp_can_be_cancelled():
             self._after, self.order = None, Order.FOLLOW
+        self.obey(command)
+
+    def obey(self, command: PowerCommand) -> None:
+        """Execute a command, as one of a control word, through every transition that it makes."""
         while self._obey(command):
-            pass
-
-    def quick_stop(self) -> None:
-        """Quick stop, as by a control word."""
-        while self._obey(PowerCommand.QUICK_STOP):
-            pass
-
-    def shut_down(self) -> None:
-        """Shut down to Ready To Switch On, as by a control word."""
-        while self._obey(PowerCommand.SHUTDOWN):
-            pass
-
-    def disable_voltage(self) -> None:
-        """Disable the voltage, as by a control word."""
-        while self._obey(PowerCommand.DISABLE_VOLTAGE):
             pass
 
     def abort_connection(self) -> None:
         """React to a lost connection by 6007h, except for the fault, which the drive raises."""
         option = self._option(0x6007)
         if option == _ABORT_DISABLE:
-            self.disable_voltage()
+            self.obey(PowerCommand.DISABLE_VOLTAGE)
         elif option == _ABORT_QUICK_STOP:
-            self.quick_stop()
+            self.obey(PowerCommand.QUICK_STOP)
 
     @property
     def faults_on_abort(self) -> bool:

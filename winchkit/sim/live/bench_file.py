@@ -11,7 +11,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 from winchkit.catalog import Kind, find, folder
 from winchkit.errors import FileError
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.quantity import Quantity
+from winchkit.sim.physics.parameters import quantity_of
 from winchkit.units import UNITS
 
 _MARK = "# written by winchkit: the bench of a simulation"
@@ -90,21 +90,11 @@ def _text(value: Any, hint: Any) -> str:
         inner = hint if get_origin(hint) is tuple else next(of_alternatives, hint)
         item = next(iter(get_args(inner)), inner)
         return "[" + ", ".join(_text(one, item) for one in value) + "]"
-    marker = _marker(hint)
+    marker = quantity_of(hint)
     if isinstance(value, float) and marker is not None:
         unit = next(iter(UNITS[marker.dimension]))
         return repr(value) if marker.dimension == "ratio" else json.dumps(f"{value!r} {unit}")
     return json.dumps(value)
-
-
-def _marker(hint: Any) -> Quantity | None:
-    for part in (*getattr(hint, "__metadata__", ()), *get_args(hint)):
-        if isinstance(part, Quantity):
-            return part
-        found = None if isinstance(part, type) else _marker(part)
-        if found is not None:
-            return found
-    return None
 
 
 def _key(name: str) -> str:

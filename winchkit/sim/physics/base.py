@@ -1,4 +1,4 @@
-"""Base class of the simulator's physics: parameters, and hooks in the winch's two chains."""
+"""Base class of the simulator's physics: the true state, parameters, hooks in the two chains."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar
 
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
-from winchkit.sim.physics.state import PlantState
 
 Stiffness = Annotated[float, Quantity("stiffness", 0.0, above=True)]
 Viscosity = Annotated[float, Quantity("viscosity")]
@@ -23,6 +22,40 @@ the drum follows the servo whatever the friction, so that its direction may be a
 _MOTOR_STANDSTILL = 0.01
 """rad/s: the same for friction of the motor, by a gearbox of 20 and a radius of 60 mm (0.03 mm/s).
 """
+
+
+@dataclass(slots=True)
+class PlantState:
+    """Present true state; SI, mutable, owned by the plant."""
+
+    time: float = 0.0
+    temperature: float = 20.0
+    """degC."""
+    motor_angle: float = 0.0
+    motor_speed: float = 0.0
+    motor_acceleration: float = 0.0
+    drum_angle: float = 0.0
+    """Since the reference, positive winds in, rad."""
+    wound_angle: float = 0.0
+    """Total on the drum, rad."""
+    arm: float = 0.0
+    """Cable wound in per motor radian, m/rad, signed."""
+    winding_speed: float = 0.0
+    """Positive winds in, m/s."""
+    winding_acceleration: float = 0.0
+    unstrained: float = 0.0
+    """Unstrained free cable length, m."""
+    dead_length: float = 0.0
+    inclination: float = 0.0
+    cable_length: float = 0.0
+    """From the exit point to the attachment, m."""
+    load_mass: float = 0.0
+    load: float = 0.0
+    """Tension at the platform, N."""
+    tension: float = 0.0
+    """Tension between the pulleys and the drum, N."""
+    motor_torque: float = 0.0
+    """True torque of the motor, N m."""
 
 
 def winding_direction(state: PlantState) -> float:
@@ -44,9 +77,14 @@ class Physics:
     """
 
     size: ClassVar[str] = ""
-    """The field of its size."""
+    """The field of its size: the first one unless declared; empty where it has no null."""
     inverse: ClassVar[bool] = False
     """Whether a larger ``size`` is a smaller effect (a stiffness)."""
+
+    def __init_subclass__(cls) -> None:
+        """Take the first field as that of the size, where none is declared."""
+        if "size" not in vars(cls):
+            cls.size = next(iter(cls.__annotations__))
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
         """Return the true profile; called once."""

@@ -15,8 +15,7 @@ from winchkit.schema.quantity import (
     PositiveNumber,
     Quantity,
 )
-from winchkit.sim.physics.base import Physics, Stiffness, winding_direction
-from winchkit.sim.physics.state import PlantState
+from winchkit.sim.physics.base import Physics, PlantState, Stiffness, winding_direction
 
 
 @dataclass
@@ -25,7 +24,6 @@ class FiveCornerDrum(Physics):
 
     amplitude: Length = 0.0003
     order: PositiveNumber = 5.0
-    size: ClassVar[str] = "amplitude"
 
     def wound_length(self, state: PlantState) -> tuple[float, float]:
         angle = self.order * state.drum_angle
@@ -40,7 +38,6 @@ class TorqueCrosstalk(Physics):
     """N per N m of motor torque."""
     wave: PositiveNumber = 3.0
     """Periods per motor torque of 1 N m, by rectification."""
-    size: ClassVar[str] = "per_torque"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.per_torque * sin(2 * pi * self.wave * state.motor_torque)
@@ -53,7 +50,6 @@ class TemperatureCrosstalk(Physics):
     swing: Force = 3.0
     period: Annotated[float, Quantity("ratio", 0.0, above=True)] = 1.5
     """Period, K."""
-    size: ClassVar[str] = "swing"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.swing * sin(2 * pi * state.temperature / self.period)
@@ -67,7 +63,6 @@ class StickyPlace(Physics):
     at: Length = 2.4
     """Cable length of the friction, m."""
     width: PositiveLength = 0.1
-    size: ClassVar[str] = "force"
 
     def pulley(
         self, state: PlantState, index: int, wrap: float, tension: float, dt: float
@@ -103,7 +98,6 @@ class WanderingLength(Physics):
 
     amplitude: Length = 0.0015
     period: PositiveDuration = 7.0
-    size: ClassVar[str] = "amplitude"
 
     def length_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.amplitude * sin(2 * pi * state.time / self.period)

@@ -14,9 +14,8 @@ from winchkit.schema.quantity import (
     PositiveForce,
     PositiveNumber,
 )
-from winchkit.sim.physics.base import Expansion, Physics, Stiffness
+from winchkit.sim.physics.base import Expansion, Physics, PlantState, Stiffness
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import PlantState
 from winchkit.units import GRAVITY
 
 _WARM = 20.0
@@ -28,7 +27,6 @@ class ElasticCable(Physics):
     """The cable is a spring of stiffness EA over all of its stressed length."""
 
     axial_stiffness: PositiveForce = 300e3
-    size: ClassVar[str] = "axial_stiffness"
     inverse: ClassVar[bool] = True
 
     def compliance(self, state: PlantState) -> float:
@@ -40,7 +38,6 @@ class SoftFrame(Physics):
     """The frame is compliant, independent of the cable length."""
 
     stiffness: Stiffness = 60e3
-    size: ClassVar[str] = "stiffness"
     inverse: ClassVar[bool] = True
 
     def compliance(self, state: PlantState) -> float:
@@ -52,7 +49,6 @@ class WarmCable(Physics):
     """The cable lengthens with temperature above 20 degC."""
 
     expansion: Expansion = 1.1e-5
-    size: ClassVar[str] = "expansion"
 
     def stretch(self, state: PlantState, dt: float) -> float:
         strain = self.expansion * (state.temperature - _WARM)
@@ -65,7 +61,6 @@ class CreepingCable(Physics):
 
     creep_stiffness: PositiveForce = 300e3
     time_constant: PositiveDuration = 4.0
-    size: ClassVar[str] = "creep_stiffness"
     inverse: ClassVar[bool] = True
     _strain: float = 0.0
 
@@ -104,7 +99,6 @@ class HeavyCable(Physics):
     """Weight of the free cable."""
 
     mass_per_length: LinearDensity = 0.15
-    size: ClassVar[str] = "mass_per_length"
 
     def weight(self, state: PlantState) -> float:
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)
@@ -116,7 +110,6 @@ class LoadLever(Physics):
 
     amplitude: Number = 0.03
     phase: Angle = 0.3
-    size: ClassVar[str] = "amplitude"
 
     def weight(self, state: PlantState) -> float:
         return state.load * self.amplitude * sin(state.drum_angle + self.phase)

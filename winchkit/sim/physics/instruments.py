@@ -8,8 +8,7 @@ from math import exp
 from typing import Annotated, ClassVar
 
 from winchkit.schema.quantity import Force, Number, PositiveDuration, PositiveForce, Quantity
-from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
-from winchkit.sim.physics.state import PlantState
+from winchkit.sim.physics.base import ForceDrift, Physics, PlantState, ThermalForce
 
 
 @dataclass
@@ -17,7 +16,6 @@ class StretchedCell(Physics):
     """The cell's gain is wrong."""
 
     gain_error: Number = 0.02
-    size: ClassVar[str] = "gain_error"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)
@@ -28,7 +26,6 @@ class ShiftedCell(Physics):
     """The cell's zero is wrong."""
 
     offset: Force = 4.0
-    size: ClassVar[str] = "offset"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.offset
@@ -39,7 +36,6 @@ class BentCell(Physics):
     """The cell's characteristic is quadratic: ``quadratic`` N at 500 N."""
 
     quadratic: Force = 25.0
-    size: ClassVar[str] = "quadratic"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.quadratic * (state.tension / 500.0) ** 2
@@ -50,7 +46,6 @@ class DriftingCell(Physics):
     """The cell's zero drifts with time."""
 
     drift: ForceDrift = 0.4
-    size: ClassVar[str] = "drift"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.drift * state.time
@@ -61,7 +56,6 @@ class WarmCell(Physics):
     """The cell's zero depends on the temperature above 20 degC."""
 
     sensitivity: ThermalForce = 0.5
-    size: ClassVar[str] = "sensitivity"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.sensitivity * (state.temperature - 20.0)
@@ -72,7 +66,6 @@ class SlowCell(Physics):
     """The amplifier's low-pass, first order."""
 
     time_constant: PositiveDuration = 0.1
-    size: ClassVar[str] = "time_constant"
     _value: float | None = None
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
@@ -101,7 +94,6 @@ class LeakingCurrent(Physics):
 
     share: Annotated[float, Quantity("force per torque")] = 4.0
     """N per N m of motor torque."""
-    size: ClassVar[str] = "share"
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading + self.share * state.motor_torque
@@ -112,7 +104,6 @@ class LateLength(Physics):
     """The length instrument has a delay of ``delay``."""
 
     delay: PositiveDuration = 0.003
-    size: ClassVar[str] = "delay"
     _past: deque[tuple[float, float]] = field(default_factory=deque)
 
     def length_signal(self, state: PlantState, reading: float, dt: float) -> float:

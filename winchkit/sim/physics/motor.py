@@ -17,12 +17,12 @@ from winchkit.schema.quantity import (
 )
 from winchkit.sim.physics.base import (
     Physics,
+    PlantState,
     RotationalViscosity,
     motor_direction,
     winding_direction,
 )
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import PlantState
 
 AngularSpeed = Annotated[float, Quantity("angular speed", 0.0, above=True)]
 Efficiency = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
@@ -33,6 +33,7 @@ class LossyGear(Physics):
     """Losses of the gearbox: more torque for winding in, less for paying out."""
 
     efficiency: Efficiency = 0.94
+    size: ClassVar[str] = ""
 
     def gear(self, state: PlantState, torque: float) -> float:
         """Divide by the efficiency winding in, multiply paying out."""
@@ -44,7 +45,6 @@ class MotorDrag(Physics):
     """Coulomb friction of motor and seals, independent of the load."""
 
     torque: Torque = 0.025
-    size: ClassVar[str] = "torque"
 
     def motor(self, state: PlantState) -> float:
         return motor_direction(state) * self.torque
@@ -55,7 +55,6 @@ class MotorGrease(Physics):
     """Viscous friction of the motor."""
 
     viscosity: RotationalViscosity = 1.5e-4
-    size: ClassVar[str] = "viscosity"
 
     def motor(self, state: PlantState) -> float:
         return self.viscosity * state.motor_speed
@@ -66,7 +65,6 @@ class OneWayGrease(Physics):
     """Viscous friction with a difference of the two directions from their mean."""
 
     viscosity_difference: RotationalViscosity = 1e-4
-    size: ClassVar[str] = "viscosity_difference"
 
     def motor(self, state: PlantState) -> float:
         return self.viscosity_difference * abs(state.motor_speed)
@@ -78,7 +76,6 @@ class MotorStiction(Physics):
 
     torque: Torque = 0.03
     stribeck_speed: AngularSpeed = 20.0
-    size: ClassVar[str] = "torque"
 
     def motor(self, state: PlantState) -> float:
         fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
@@ -91,7 +88,6 @@ class PreslidingMotor(Physics):
 
     torque: Torque = 0.03
     distance: Annotated[float, Quantity("angle", 0.0, above=True)] = 2.0
-    size: ClassVar[str] = "torque"
     _force: float = 0.0
     _angle: float | None = None
 
@@ -110,7 +106,6 @@ class Cogging(Physics):
     amplitude: Torque = 0.015
     order: PositiveNumber = 4.0
     phase: Angle = 0.3
-    size: ClassVar[str] = "amplitude"
 
     def motor(self, state: PlantState) -> float:
         return self.amplitude * sin(self.order * state.motor_angle + self.phase)
@@ -123,7 +118,6 @@ class RippledMotor(Physics):
     amplitude: Number = 0.02
     order: PositiveNumber = 6.0
     phase: Angle = 0.3
-    size: ClassVar[str] = "amplitude"
 
     def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.amplitude * sin(self.order * state.motor_angle + self.phase))
@@ -135,7 +129,6 @@ class UnbalancedDrum(Physics):
 
     amplitude: Torque = 0.02
     phase: Angle = 0.3
-    size: ClassVar[str] = "amplitude"
 
     def motor(self, state: PlantState) -> float:
         return self.amplitude * sin(state.drum_angle + self.phase)
@@ -154,7 +147,6 @@ class Balancer(Physics):
 
     stiffness: Annotated[float, Quantity("rotational stiffness")] = 1e-3
     torque: Torque = 0.02
-    size: ClassVar[str] = "stiffness"
 
     def motor(self, state: PlantState) -> float:
         return self.stiffness * state.drum_angle + self.torque
@@ -165,7 +157,6 @@ class GrowingDrag(Physics):
     """Coulomb friction of the motor that grows with time."""
 
     rate: Annotated[float, Quantity("torque per time")] = 1e-3
-    size: ClassVar[str] = "rate"
 
     def motor(self, state: PlantState) -> float:
         return motor_direction(state) * self.rate * state.time
@@ -178,7 +169,6 @@ class RoughPlace(Physics):
     torque: Torque = 0.05
     place: Angle = 22.0
     width: Annotated[float, Quantity("angle", 0.0, above=True)] = 2.0
-    size: ClassVar[str] = "torque"
 
     def motor(self, state: PlantState) -> float:
         distance = (state.drum_angle - self.place) / self.width
@@ -190,7 +180,6 @@ class HeavyRotor(Physics):
     """Inertia of rotor and gearbox, at the motor."""
 
     inertia: Inertia = 1e-4
-    size: ClassVar[str] = "inertia"
 
     def rotor_inertia(self) -> float:
         return self.inertia
@@ -204,7 +193,6 @@ class WeakMotor(Physics):
     """The drive's torque constant is wrong, and its reported torque with it."""
 
     gain_error: Number = 0.05
-    size: ClassVar[str] = "gain_error"
 
     def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)
@@ -215,7 +203,6 @@ class SlowTorque(Physics):
     """The drive's filter of its torque signal, first order."""
 
     time_constant: PositiveDuration = 0.08
-    size: ClassVar[str] = "time_constant"
     _value: float | None = None
 
     def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:

@@ -18,17 +18,18 @@ def _markers(kind: type[Any]) -> dict[str, Quantity]:
     hints = get_type_hints(kind, include_extras=True)
     found = {}
     for field in fields(kind):
-        marker = _marker(hints[field.name])
+        marker = quantity_of(hints[field.name])
         if marker is not None and not field.name.startswith("_"):
             found[field.name] = marker
     return found
 
 
-def _marker(hint: Any) -> Quantity | None:
+def quantity_of(hint: Any) -> Quantity | None:
+    """Quantity that the type of a field has, also within a union or a tuple; None without one."""
     for part in (*getattr(hint, "__metadata__", ()), *get_args(hint)):
         if isinstance(part, Quantity):
             return part
-        inner = _marker(part) if get_args(part) else None
+        inner = quantity_of(part) if get_args(part) else None
         if inner is not None:
             return inner
     return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from winchkit.errors import Fault, FileError, suggest
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec
-from winchkit.sim.physics import beyond, cable, instruments, maxwell, motor, pulley, winding
+from winchkit.sim.physics import beyond, cable, instruments, motor, pulley, winding
 from winchkit.sim.physics.base import Physics
 from winchkit.sim.physics.parameters import number_names, read_numbers, with_unit
 
@@ -35,7 +35,7 @@ PHYSICS: dict[str, type[Physics]] = {
     "viscous pulleys": pulley.ViscousPulleys,
     "creep-sticky pulleys": pulley.CreepPulleys,
     "heavy pulleys": pulley.HeavyPulleys,
-    "Maxwell-slip pulleys": maxwell.MaxwellPulleys,
+    "Maxwell-slip pulleys": pulley.MaxwellPulleys,
     "sticky place": beyond.StickyPlace,
     "stretched cell": instruments.StretchedCell,
     "shifted cell": instruments.ShiftedCell,

@@ -9,8 +9,7 @@ from typing import ClassVar
 from winchkit.errors import FileError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
-from winchkit.sim.physics.base import Physics, motor_direction
-from winchkit.sim.physics.state import PlantState
+from winchkit.sim.physics.base import Physics, PlantState, motor_direction
 
 _SLIP_TIME = 0.4
 """s: short against a stroke, many steps of the integration."""
@@ -21,7 +20,6 @@ class FatDrum(Physics):
     """The drum's radius is larger than declared."""
 
     radius_error: Length = 0.00015
-    size: ClassVar[str] = "radius_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
         radius = profile.drum.winding_radius + self.radius_error
@@ -33,7 +31,6 @@ class WrongRatio(Physics):
     """The gearbox has another ratio than declared."""
 
     ratio_error: Number = 0.004
-    size: ClassVar[str] = "ratio_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
         ratio = profile.gearbox.ratio * (1 + self.ratio_error)
@@ -45,7 +42,6 @@ class ThickLayers(Physics):
     """The growth of the layers on a drum is larger than declared."""
 
     growth_error: Length = 0.00005
-    size: ClassVar[str] = "growth_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
         """Add the error to the layer growth; FileError on a drum without layers."""
@@ -62,7 +58,6 @@ class EccentricDrum(Physics):
 
     eccentricity: Length = 0.0005
     phase: Angle = 0.7
-    size: ClassVar[str] = "eccentricity"
 
     def wound_length(self, state: PlantState) -> tuple[float, float]:
         """Sine of the drum angle, zero at the reference."""
@@ -101,7 +96,6 @@ class WavyGear(Physics):
     amplitude: Angle = 0.0002
     order: PositiveNumber = 1.0
     phase: Angle = 0.4
-    size: ClassVar[str] = "amplitude"
     _ratio: float = 1.0
 
     def begin(self, profile: WinchProfile) -> None:
@@ -119,7 +113,6 @@ class Slip(Physics):
 
     step: Angle = 0.03
     time: Duration = 5.0
-    size: ClassVar[str] = "step"
 
     def drum_angle(self, state: PlantState, dt: float) -> tuple[float, float, float]:
         """A smooth step that takes 0.4 s."""
@@ -143,7 +136,6 @@ class LooseGear(Physics):
     gap: Angle = 0.01
     drag: Torque = 30.0
     """Friction torque at the drum, N m."""
-    size: ClassVar[str] = "gap"
     _ratio: float = 1.0
     _radius: float = 0.0
     _drum: float | None = None

@@ -9,9 +9,8 @@ from typing import Any
 from winchkit.errors import UsageError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
-from winchkit.sim.physics.base import HOOKS, Physics
+from winchkit.sim.physics.base import HOOKS, Physics, PlantState
 from winchkit.sim.physics.parameters import overridden
-from winchkit.sim.physics.state import PlantState
 from winchkit.sim.physics.table import build, declared
 from winchkit.sim.plant.drum import CLIMB
 from winchkit.sim.plant.hanging_load import CableLoad, HangingLoad

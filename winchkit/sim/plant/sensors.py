@@ -7,7 +7,7 @@ from random import Random
 from typing import NamedTuple
 
 from winchkit.schema.simbench import NoiseSpec
-from winchkit.sim.physics.state import PlantState
+from winchkit.sim.physics.base import PlantState
 
 
 class GaussianNoise:

@@ -90,29 +90,18 @@ LIMITS: dict[int | tuple[int, int], int] = {
 def test_limits_are_written_in_counts_and_read_back_in_si() -> None:
     """Scale: 1 mrad, 1 mrad/s, 0.01 N m (a rated torque of 10 N m)."""
     objects = Objects(LIMITS)
-    wanted = LimitsAtShaft(
-        angle=(40.0, -2.5),
-        following_error=0.5,
-        following_time=0.02,
-        torque=12.0,
-        torque_positive=8.0,
-        torque_negative=4.0,
-        speed=150.0,
-    )
+    wanted = LimitsAtShaft(angle=(40.0, -2.5), following_error=0.5, torque=12.0)
     kept = set_limits(objects, SCALE, wanted)  # type: ignore[arg-type]
     assert objects.written == [
         (0x607D, 1, -2500),
         (0x607D, 2, 40_000),
         (0x6065, 0, 500),
-        (0x6066, 0, 20),
         (0x6072, 0, 1200),
-        (0x60E0, 0, 800),
-        (0x60E1, 0, 400),
-        (0x607F, 0, 150_000),
     ]
     assert kept.angle == (-2.5, 40.0)
-    assert (kept.torque, kept.torque_positive, kept.torque_negative) == (12.0, 8.0, 4.0)
-    assert (kept.following_error, kept.following_time) == (0.5, 0.02)
+    assert (kept.torque, kept.torque_positive, kept.torque_negative) == (12.0, 10.0, 10.0)
+    assert (kept.following_error, kept.following_time) == (0.5, 0.01)
+    assert kept.speed == pytest.approx(500.0)
 
 
 def test_limits_that_are_not_declared_are_left_alone() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hand_made import CYCLE, NODE, RPDO, SCALE, TPDO, HandMade, codec
 from winchkit.drivers.can.cia402.feedback import Gathering, check_feedback
-from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
+from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState, StatusBit
 from winchkit.errors import FileError
 
 ENABLED, READY, DISABLED = 0x0237, 0x0231, 0x0250
@@ -27,7 +27,7 @@ def test_all_of_an_answer_in_si() -> None:
     assert feedback.torque == pytest.approx(0.75)
     assert (feedback.state, feedback.error_code) == (DriveState.OPERATION_ENABLED, 0x8611)
     assert feedback.limited
-    assert feedback.target_reached
+    assert feedback.status & StatusBit.TARGET_REACHED
 
 
 def test_an_answer_of_which_a_part_came_late_is_not_torn() -> None:

@@ -64,7 +64,7 @@ class Interface(Protocol):
 
     library: Any
     """python-can's bus, for canopen."""
-    dropped: int
+    dropped: int = 0
     """Frames that its queue had no room for."""
 
     def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
@@ -79,23 +79,24 @@ class Interface(Protocol):
 
     def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
         """Send the first of these frames in one call; returns how many, 0 without such a call."""
+        return 0
 
     def send_remote(self, identifier: int) -> None:
         """Send a remote frame of 11 bits for one byte; raises can.CanError or OSError."""
 
     def state(self) -> BusState | None:
         """State of the controller; None where only error frames report it."""
+        return None
 
     def close(self) -> None:
         """Close it; raises nothing."""
 
 
-class _Library:
+class _Library(Interface):
     """Any interface of python-can."""
 
     def __init__(self, bus: Any, stamped: bool) -> None:
         self.library = bus
-        self.dropped = 0
         self._stamped = stamped
         self._tells = type(bus).state is not can.BusABC.state
 
@@ -112,9 +113,6 @@ class _Library:
     def send(self, identifier: int, data: bytes) -> None:
         self.library.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
-    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
-        return 0
-
     def send_remote(self, identifier: int) -> None:
         self.library.send(_remote_frame(identifier))
 
@@ -126,27 +124,25 @@ class _Library:
             self.library.shutdown()
 
 
-class _Multicast:
+class _Multicast(Interface):
     """A group of UDP multicast."""
 
     def __init__(self, port: MulticastPort) -> None:
         self.library = _Sender(port)
-        self.dropped = 0
         self._port = port
-        self.send, self.close = port.send, port.close
 
     def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         received = self._port.receive(timeout)
         return () if received is None else (ReceivedFrame(*received),)
 
-    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
-        return 0
+    def send(self, identifier: int, data: bytes) -> None:
+        self._port.send(identifier, data)
 
     def send_remote(self, identifier: int) -> None:
         self._port.send(identifier, b"", remote=True)
 
-    def state(self) -> BusState | None:
-        return None
+    def close(self) -> None:
+        self._port.close()
 
 
 class _Sender:
@@ -159,12 +155,11 @@ class _Sender:
         self._port.send(message.arbitration_id, bytes(message.data), remote=message.is_remote_frame)
 
 
-class _Simulated:
+class _Simulated(Interface):
     """A port of a simulated bus in this process, in simulated time."""
 
     def __init__(self, port: Any) -> None:
         self.library = port
-        self.dropped = 0
 
     def receive(self, timeout: float) -> Sequence[ReceivedFrame]:
         received = self.library.receive(timeout)
@@ -173,14 +168,8 @@ class _Simulated:
     def send(self, identifier: int, data: bytes) -> None:
         self.library.transmit(identifier, data)
 
-    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
-        return 0
-
     def send_remote(self, identifier: int) -> None:
         self.library.send(_remote_frame(identifier))
-
-    def state(self) -> BusState | None:
-        return None
 
     def close(self) -> None:
         self.library.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import can
 from canopen.lss import (
@@ -16,7 +16,7 @@ from canopen.lss import (
     LssMaster,
 )
 
-from winchkit.drivers.can.bus.bus import Handler
+from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.errors import DeviceRefused, NoReply, UsageError
 
@@ -62,25 +62,10 @@ def check_bitrate(bitrate: int | None) -> None:
         raise UsageError(f"{bitrate} bit/s is not in the standard's table: {known}")
 
 
-class LssPort(Protocol):
-    """What LSS needs of a bus; ``CanBus`` is one."""
-
-    @property
-    def name(self) -> str:
-        """Of the bus."""
-
-    @property
-    def network(self) -> Any:
-        """canopen's network, which has the LSS master."""
-
-    def on(self, identifier: int, handler: Handler) -> None:
-        """Call ``handler`` for every frame with this identifier."""
-
-
 class LssLine:
     """The LSS master of a bus; one at a time."""
 
-    def __init__(self, bus: LssPort) -> None:
+    def __init__(self, bus: CanBus) -> None:
         self._name = bus.name
         self._master: Any = bus.network.lss
         bus.on(_REPLY, lambda data, now: self._master.on_message_received(_REPLY, data, now))
@@ -112,31 +97,23 @@ class LssLine:
         with self._errors("ask for the node id"):
             return int(self._master.inquire_node_id())
 
-    def set_node(self, node: int) -> None:
-        """Give the selected device a node id, from its next start of communication on."""
-        check_node(node)
-        with self._errors(f"set the node id {node}"):
-            self._master.configure_node_id(node)
-
-    def set_bitrate(self, bitrate: int) -> None:
-        """Give the selected device a bit rate, from its next start on once stored."""
-        check_bitrate(bitrate)
-        with self._errors(f"set the bit rate {bitrate}"):
-            self._master.configure_bit_timing(BIT_RATES[bitrate])
-
     def configure(self, node: int | None, bitrate: int | None, *, store: bool) -> None:
-        """Set what is given, and let the selected device keep it where ``store`` is true."""
-        if node is not None:
-            self.set_node(node)
-        if bitrate is not None:
-            self.set_bitrate(bitrate)
-        if store:
-            self.store()
+        """Set what is given, and let the selected device keep it where ``store`` is true.
 
-    def store(self) -> None:
-        """Let the selected device keep what was set."""
-        with self._errors("store"):
-            self._master.store_configuration()
+        A node id is valid from its next start of communication on, a bit rate from its next start
+        on once stored.
+        """
+        check_node(node)
+        if node is not None:
+            with self._errors(f"set the node id {node}"):
+                self._master.configure_node_id(node)
+        check_bitrate(bitrate)
+        if bitrate is not None:
+            with self._errors(f"set the bit rate {bitrate}"):
+                self._master.configure_bit_timing(BIT_RATES[bitrate])
+        if store:
+            with self._errors("store"):
+                self._master.store_configuration()
 
     def close(self) -> None:
         """Leave every device in the state in which it takes part in the network."""

@@ -35,7 +35,10 @@ _COMMANDS = {
 
 
 def state_text(state: int) -> str:
-    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have."""
+    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have.
+
+    The byte is the device's own: one that the standard does not know must not end a loop.
+    """
     return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
 

@@ -201,9 +201,8 @@ class SdoNode:
     def place(self, index: int, sub: int = 0) -> str:
         """How messages name an object."""
         variable = self.dictionary.get_variable(index, sub)
-        number = f"{index:04X}h:{sub}" if sub else f"{index:04X}h"
         name = f" ({variable.name})" if variable is not None else ""
-        return f"bus '{self.bus.name}' node {self.node} {number}{name}"
+        return f"bus '{self.bus.name}' node {self.node} {object_name(index, sub)}{name}"
 
     def read(self, index: int, sub: int = 0) -> int:
         """Value of an integer object; raises NoReply, DeviceRefused."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
-from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
+from winchkit.drivers.can.canopen.nmt import NmtState, state_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.command import Commander, CycleCommand
@@ -93,9 +93,7 @@ class Cia402Axis:
         self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
         """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
-        self._position = MotorPosition(
-            device.servo, watch.speed, watch.play, response=watch.response, late=watch.late
-        )
+        self._position = MotorPosition(device.servo, watch)
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
@@ -214,10 +212,7 @@ class Cia402Axis:
     def nmt_text(self) -> str:
         """NMT state of its heartbeat in words."""
         state = self.heartbeat.state
-        if state is None:
-            return "unknown"
-        # The byte is the drive's own: one that the standard does not know must not end the loop.
-        return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
+        return "unknown" if state is None else state_text(state)
 
     @property
     def alarms(self) -> tuple[int, ...]:
@@ -336,11 +331,6 @@ class Cia402Axis:
     def health(self) -> FeedbackHealth:
         """Counts of its TPDOs since it was commissioned."""
         return FeedbackHealth() if self._gathering is None else self._gathering.health
-
-    @property
-    def short_frames(self) -> int:
-        """Frames with fewer bytes than they should have."""
-        return self.health.short + self.emergencies.short
 
     def _enter_mode(self, name: str) -> None:
         self._mode = mode = MODES[name]

@@ -7,6 +7,7 @@ from enum import Enum
 from itertools import accumulate, islice
 from typing import NamedTuple
 
+from winchkit.drivers.can.canopen.node import object_name
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
@@ -191,7 +192,7 @@ class Commander:
                 codec.encode(own)
             except struct.error:
                 said = zip(codec.position, own, strict=True)
-                words = ", ".join(f"{_text(key)} = {value}" for key, value in said)
+                words = ", ".join(f"{object_name(*key)} = {value}" for key, value in said)
                 return (
                     f"{self._name}: a target does not fit into RPDO {codec.spec.number} ({words}); "
                     "it is beyond the drive's range"
@@ -214,12 +215,8 @@ class Commander:
 def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:
     mapped = {key for codec in drive.rpdo for key in codec.position}
     needed = {_CONTROL} if target is None else {_CONTROL, target}
-    faults = [f"lacks {_text(key)}, which {mode} needs" for key in sorted(needed - mapped)]
+    faults = [f"lacks {object_name(*key)}, which {mode} needs" for key in sorted(needed - mapped)]
     known = _ALWAYS.union(TARGETS)
-    faults += [f"maps {_text(key)}, which nothing fills" for key in sorted(mapped - known)]
+    faults += [f"maps {object_name(*key)}, which nothing fills" for key in sorted(mapped - known)]
     if faults:
         raise FileError([Fault(f"{name}: its RPDO mapping {fault}") for fault in faults])
-
-
-def _text(key: Key) -> str:
-    return f"{key[0]:04X}h:{key[1]}" if key[1] else f"{key[0]:04X}h"

@@ -65,11 +65,6 @@ class AxisFeedback(NamedTuple):
         """Whether a limit of the drive's own holds it back (status bit 11)."""
         return bool(self.status & StatusBit.INTERNAL_LIMIT)
 
-    @property
-    def target_reached(self) -> bool:
-        """Status bit 10; its meaning depends on the mode."""
-        return bool(self.status & StatusBit.TARGET_REACHED)
-
 
 @dataclass(frozen=True, slots=True)
 class FeedbackHealth:

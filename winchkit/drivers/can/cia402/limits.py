@@ -25,16 +25,8 @@ class LimitsAtShaft:
     """Lowest and highest motor angle (607Dh), rad."""
     following_error: float | None = None
     """6065h, rad."""
-    following_time: float | None = None
-    """6066h, s."""
     torque: float | None = None
     """Greatest of either sign (6072h), N m."""
-    torque_positive: float | None = None
-    """60E0h, N m."""
-    torque_negative: float | None = None
-    """60E1h, as a positive number, N m."""
-    speed: float | None = None
-    """Of profile modes (607Fh), rad/s."""
 
 
 @dataclass(frozen=True)
@@ -94,14 +86,5 @@ def _counts(scale: CountScale, wanted: LimitsAtShaft) -> Iterator[tuple[int, int
         yield 0x607D, 2, scale.angle_counts(high)
     if wanted.following_error is not None:
         yield 0x6065, 0, scale.angle_counts(wanted.following_error)
-    if wanted.following_time is not None:
-        yield 0x6066, 0, round(wanted.following_time / _MS)
-    for index, torque in (
-        (0x6072, wanted.torque),
-        (0x60E0, wanted.torque_positive),
-        (0x60E1, wanted.torque_negative),
-    ):
-        if torque is not None:
-            yield index, 0, scale.torque_counts(torque)
-    if wanted.speed is not None:
-        yield 0x607F, 0, scale.velocity_counts(wanted.speed)
+    if wanted.torque is not None:
+        yield 0x6072, 0, scale.torque_counts(wanted.torque)

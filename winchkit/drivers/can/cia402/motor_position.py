@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from winchkit.drivers.can.canopen.node import SdoNode, object_name
-from winchkit.drivers.can.cia402.commission import Commissioned
+from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
 from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
@@ -66,23 +66,10 @@ class MotorPosition:
     The one place where it is decided whether the motor angle is known: :attr:`doubt`.
     """
 
-    def __init__(
-        self,
-        servo: ServoSpec,
-        fastest: float = 0.0,
-        play: float = 0.0,
-        *,
-        response: float = 0.0,
-        late: float = 0.0,
-    ) -> None:
-        """Take the greatest speed of the motor, rad/s (0: not known), and how far it moves while
-        it is at rest, rad.
-
-        ``response`` (s) is the longest lag of its speed, ``late`` what it turns within that, rad.
-        """
-        self._wraps, self._fastest, self._play = servo.position_wraps, fastest, play
+    def __init__(self, servo: ServoSpec, watch: WatchSpec) -> None:
+        """Take the drive's encoder, and what the bench says of the motor's motion."""
+        self._wraps, self._watch = servo.position_wraps, watch
         self._incremental = servo.encoder == "incremental"
-        self._response, self._late = response, late
         self.agreement = PositionAgreement()
         """Of its 6064h with 606Ch."""
         self.counter: PositionCounter | None = None
@@ -173,7 +160,7 @@ class MotorPosition:
         booted = boot_ups != self._boot_ups
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)
-            counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
+            counter = PositionCounter(low, high, self._watch.speed / drive.scale.angle)
             self._resume(counter, found, drive, booted=booted)
         elif booted or found.restarted:
             evidence = _RESTARTED if booted else found.restarted
@@ -185,9 +172,9 @@ class MotorPosition:
         self.agreement = PositionAgreement(
             drive.scale.angle,
             drive.scale.velocity,
-            self._response,
-            self._late,
-            self._fastest,
+            self._watch.response,
+            self._watch.late,
+            self._watch.speed,
         )
         return counter
 
@@ -267,7 +254,7 @@ class MotorPosition:
         if not kept.closed:
             return "the process that moved it last ended without closing its record"
         moved = (found.count - kept.count + span // 2) % span - span // 2
-        if abs(moved * unit) > self._play:
+        if abs(moved * unit) > self._watch.play:
             return (
                 f"6064h is {found.count} and was {kept.count} when it was closed: the drive was "
                 "switched off, set, or turned since"
