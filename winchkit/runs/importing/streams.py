@@ -21,7 +21,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.orientation import rotation_as
 from winchkit.runs.importing.stored.numbers import range_of, restored
-from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.table import ColumnTable, FileColumn, clock_before
 from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP
 
 _PADDED = 0.67
@@ -100,7 +100,7 @@ def streams_of(guess: Guess) -> Streams:
         item = used[source]
         if item.channel in {"time", DATE}:
             continue
-        clock = _clock_of(clocks, column)
+        clock = clock_before(clocks, column)
         key = clock.source if clock is not None else f"\0{len(column)}"
         blocks.setdefault(key, {})[item.channel] = column.values
     assigned = {item.channel: item for item in guess.used}
@@ -224,19 +224,13 @@ def _clock(
         values, absolute = (column.values - _EXCEL_EPOCH) * 86_400.0, True
     else:
         absolute = epoch_unit(column.values) == item.unit
-        known = column.values[np.isfinite(column.values)]
+        known = column.known
         raw = float(known[0]) if len(known) else 0.0
         # The difference first: nanoseconds since 1970 have no digits left for its fraction.
         return raw * item.factor + item.offset, (column.values - raw) * item.factor, absolute
     known = values[np.isfinite(values)]
     first = float(known[0]) if len(known) else 0.0
     return first, values - first, absolute
-
-
-def _clock_of(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn | None:
-    own = [item for item in clocks if item.group == column.group]
-    before = [item for item in own if item.number < column.number]
-    return before[-1] if before else own[0] if own else None
 
 
 def _with_quaternion(
