@@ -16,9 +16,9 @@ from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
+from winchkit.model.stages import OUTPUT_UNITS
 
 _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
-UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
 """Bars: half a terminal's line beside names and sizes."""
@@ -153,7 +153,7 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
             "time": _listed(drawn.time, width),
             "cable_length": _listed(drawn.cable_length, width),
             "changes": {
-                name: {"unit": UNITS[name], "values": _listed(change, width)}
+                name: {"unit": OUTPUT_UNITS[name], "values": _listed(change, width)}
                 for name, change in drawn.changes.items()
             },
         },
@@ -238,7 +238,9 @@ def _drawing(effect: Effect) -> list[str]:
     ]
     for name, change in drawn.changes.items():
         low, high = float(np.nanmin(change)), float(np.nanmax(change))
-        lines.append(f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {UNITS[name]}")
+        lines.append(
+            f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {OUTPUT_UNITS[name]}"
+        )
     return lines if drawn.changes else [*lines, "  no change on this motion"]
 
 

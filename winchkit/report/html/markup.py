@@ -59,6 +59,12 @@ def folded(id_: str, heading: str, *children: str, beside: str = "") -> Markup:
     return element("details", head, *children, id=id_, class_="section")
 
 
+def facts(pairs: Iterable[tuple[str, str]], class_: str = "facts") -> Markup:
+    """A list of names and their texts; names without a text are left out."""
+    parts = [p for name, text in pairs if text for p in (element("dt", name), element("dd", text))]
+    return element("dl", *parts, class_=class_)
+
+
 def details(summary: str, *children: str) -> Markup:
     """A block to be opened."""
     return element("details", element("summary", summary), *children)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.residuals.traces import OutputTrace, PoseTrace
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.errors import UsageError, suggest
@@ -70,11 +69,6 @@ def result_figure(
         legend(figure, *grid[:2])
         figure.align_ylabels()
     return figure
-
-
-def answer_figure(answer: Answer, **options: Any) -> Figure:
-    """Figure of the diagnosis of an answer; options as of :func:`result_figure`."""
-    return result_figure(answer.diagnosis, **options)
 
 
 def run_figure(
