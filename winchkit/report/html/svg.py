@@ -33,9 +33,9 @@ def page_svg(figure: Figure, width: float = WIDE) -> Markup:
     return join([shared, _of_page(figure, wide, "at-wide"), _of_page(figure, narrow, "at-narrow")])
 
 
-def file_svg(figure: Figure, width: float = WIDE) -> str:
+def file_svg(figure: Figure) -> str:
     """A figure as an SVG file in the light theme, with its source below."""
-    scene = scene_of(figure, width, source=True)
+    scene = scene_of(figure, source=True)
     drawn = element(
         "svg",
         element("title", figure.title),

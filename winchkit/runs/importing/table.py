@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError
+from winchkit.errors import Fault, RunError, WinchkitError
 
 LARGEST = 1 << 30
 """Largest size of a file, of its unpacked content and of its numbers, bytes."""
@@ -116,6 +117,17 @@ def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
 def are_whole(values: Array) -> bool:
     """Whether finite numbers, (n,), are whole; true without any."""
     return bool(np.all(values == np.round(values)))
+
+
+@contextmanager
+def readable(path: str, kind: str) -> Iterator[None]:
+    """Convert what a library raises for a damaged file of a kind to RunError."""
+    try:
+        yield
+    except WinchkitError:
+        raise
+    except Exception as error:  # noqa: BLE001 - libraries raise many kinds, even of their own bugs
+        raise RunError(Fault(f"is not a readable {kind}: {error}", path)) from None
 
 
 def refuse_size(path: str, size: int, what: str) -> None:
