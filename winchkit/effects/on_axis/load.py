@@ -10,7 +10,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _joint_gravity(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus a sin(φ + p), φ the angle of the joint."""
     return torque + values["amplitude"] * np.sin(at.drum_angle + values["phase"])
 
 
@@ -38,7 +37,6 @@ JOINT_GRAVITY = Effect(
 
 
 def _spring_balancer(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus k φ + c, φ the drum angle since the reference."""
     return torque + (values["stiffness"] * at.drum_angle + values["torque"])
 
 

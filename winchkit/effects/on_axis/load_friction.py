@@ -22,7 +22,6 @@ _SHARE = Parameter(
 
 
 def _friction_of_load(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s μ |τ|."""
     return torque + values["share"] * motor_direction(at, values) * np.abs(torque)
 
 
@@ -76,7 +75,6 @@ FRICTION_OF_TORQUE = Effect(
 
 
 def _stribeck_of_load(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s μ |τ| exp(−(θ'/ω_s)²)."""
     fallen = np.exp(-((at.motor_rate / values["stribeck_speed"]) ** 2))
     return torque + values["share"] * motor_direction(at, values) * fallen * np.abs(torque)
 

@@ -14,7 +14,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _cable_elongation_linear(length: Array, at: At, values: Values) -> Array:
-    """Length with the strain T/EA over free and dead length."""
     return length + at.stressed_length * at.tension / values["axial_stiffness"]
 
 
@@ -183,7 +182,6 @@ CABLE_ELONGATION_QUARTIC = Effect(
 
 
 def _frame_compliance(length: Array, at: At, values: Values) -> Array:
-    """Length plus T/k."""
     return length + at.tension / values["stiffness"]
 
 

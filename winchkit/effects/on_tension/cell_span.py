@@ -10,7 +10,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _cell_gain(tension: Array, at: At, values: Values) -> Array:
-    """Reading (1 + g) T."""
     return tension * (1.0 + values["gain_error"])
 
 
@@ -53,7 +52,6 @@ the parameter and its declared sizes."""
 
 
 def _cell_nonlinearity(tension: Array, at: At, values: Values) -> Array:
-    """Reading T + q (T/500 N)²."""
     return tension + values["quadratic"] * (tension / _UNIT_TENSION) ** 2
 
 
@@ -80,7 +78,6 @@ _LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
 
 
 def _cell_clipping(tension: Array, at: At, values: Values) -> Array:
-    """Reading T − q max(T − limit, 0)."""
     return tension - values["share"] * np.maximum(tension - values["limit"], 0.0)
 
 

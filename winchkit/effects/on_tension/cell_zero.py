@@ -8,7 +8,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _cell_offset(tension: Array, at: At, values: Values) -> Array:
-    """Reading T + o."""
     return tension + values["offset"]
 
 
@@ -32,7 +31,6 @@ CELL_OFFSET = Effect(
 
 
 def _cell_drift(tension: Array, at: At, values: Values) -> Array:
-    """Reading T + d t, t from the run's start."""
     return tension + values["drift"] * at.time
 
 
@@ -60,7 +58,6 @@ beside it."""
 
 
 def _cell_thermal(tension: Array, at: At, values: Values) -> Array:
-    """Reading T + k (temperature − 20 °C)."""
     return tension + values["sensitivity"] * (at.temperature - _AT_CALIBRATION)
 
 
@@ -84,7 +81,6 @@ CELL_THERMAL = Effect(
 
 
 def _cell_crosstalk(tension: Array, at: At, values: Values) -> Array:
-    """Reading T + c m, m the measured motor torque."""
     return tension + values["share"] * at.motor_torque
 
 

@@ -47,7 +47,6 @@ CABLE_WEIGHT = Effect(
 
 
 def _load_lever(tension: Array, at: At, values: Values) -> Array:
-    """Tension T (1 + a sin(φ + p))."""
     return tension * (1.0 + values["amplitude"] * np.sin(at.drum_angle + values["phase"]))
 
 

@@ -81,7 +81,6 @@ PULLEY_CAPSTAN = Effect(
 
 
 def _pulley_viscous(tension: Array, at: At, values: Values) -> Array:
-    """Tension plus c v."""
     return tension + values["viscosity"] * at.speed
 
 
@@ -201,7 +200,6 @@ PULLEY_DAHL = Effect(
 
 
 def _pulley_inertia(tension: Array, at: At, values: Values) -> Array:
-    """Tension plus m_eq dv/dt."""
     return tension + values["equivalent_mass"] * np.gradient(at.speed, at.time)
 
 

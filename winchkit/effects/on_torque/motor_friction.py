@@ -12,7 +12,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _motor_coulomb(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s c."""
     return torque + values["torque"] * motor_direction(at, values)
 
 
@@ -37,7 +36,6 @@ MOTOR_COULOMB = Effect(
 
 
 def _motor_coulomb_asymmetry(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus an offset."""
     return torque + values["offset"]
 
 
@@ -58,7 +56,6 @@ MOTOR_COULOMB_ASYMMETRY = Effect(
 
 
 def _motor_viscous(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus b θ'."""
     return torque + values["viscosity"] * at.motor_rate
 
 
@@ -80,7 +77,6 @@ MOTOR_VISCOUS = Effect(
 
 
 def _motor_viscous_asymmetry(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus d |θ'|."""
     return torque + values["viscosity_difference"] * np.abs(at.motor_rate)
 
 
@@ -104,7 +100,6 @@ MOTOR_VISCOUS_ASYMMETRY = Effect(
 
 
 def _motor_stribeck(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s b exp(−(θ'/ω_s)²)."""
     return torque + values["torque"] * motor_direction(at, values) * np.exp(
         -((at.motor_rate / values["stribeck_speed"]) ** 2)
     )
@@ -185,7 +180,6 @@ _PLACES = tuple((k + 0.5) / 12 for k in range(12))
 
 
 def _friction_at_place(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s c exp(−((φ − φ0)/w)²)."""
     distance = (at.drum_angle - values["place"]) / values["width"]
     return torque + values["torque"] * motor_direction(at, values) * np.exp(-(distance**2))
 
@@ -218,7 +212,6 @@ FRICTION_AT_PLACE = Effect(
 
 
 def _friction_growth(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus s g t, t from the run's start."""
     return torque + values["rate"] * at.time * motor_direction(at, values)
 
 

@@ -17,7 +17,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _rotor_inertia(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus J θ''."""
     return torque + values["inertia"] * at.motor_acceleration
 
 
@@ -49,7 +48,6 @@ ROTOR_INERTIA = Effect(
 
 
 def _motor_cogging(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus a sin(kθ + p)."""
     return torque + values["amplitude"] * np.sin(values["order"] * at.motor_angle + values["phase"])
 
 
@@ -76,7 +74,6 @@ MOTOR_COGGING = Effect(
 
 
 def _drum_unbalance(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus a sin(φ + p), φ the drum angle."""
     return torque + values["amplitude"] * np.sin(at.drum_angle + values["phase"])
 
 

@@ -19,7 +19,6 @@ from winchkit.model.stages import At, Stage
 
 
 def _torque_constant(torque: Array, at: At, values: Values) -> Array:
-    """Torque (1 + g) τ."""
     return torque * (1.0 + values["gain_error"])
 
 
@@ -53,7 +52,6 @@ TORQUE_CONSTANT = Effect(
 
 
 def _torque_ripple(torque: Array, at: At, values: Values) -> Array:
-    """Torque (1 + a sin(kθ + p)) τ."""
     wave = np.sin(values["order"] * at.motor_angle + values["phase"])
     return torque * (1.0 + values["amplitude"] * wave)
 
