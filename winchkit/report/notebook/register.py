@@ -13,7 +13,6 @@ from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Renderer, renderers
 from winchkit.report.notebook import figures, html, text
-from winchkit.report.notebook.profile_figures import winch_figure
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -27,7 +26,7 @@ def _of_diagnosis(render: Callable[..., Any]) -> Callable[..., Any]:
 
 for _kind, _renderer in (
     (Run, Renderer(text.run_screen, html.run_cell, figures.run_figure)),
-    (WinchProfile, Renderer(text.profile_screen, html.profile_cell, winch_figure)),
+    (WinchProfile, Renderer(text.profile_screen, html.profile_cell, figures.winch_figure)),
     (Comparison, Renderer(text.comparison_screen, html.comparison_cell, figures.result_figure)),
     (Diagnosis, Renderer(*_DIAGNOSIS)),
     (Answer, Renderer(*map(_of_diagnosis, _DIAGNOSIS))),
