@@ -63,25 +63,37 @@ class CellRecording:
 
 @dataclass(frozen=True)
 class CellFindings:
-    """Health of a recorded cell."""
+    """Health of a recorded cell.
+
+    Attributes
+    ----------
+    name : str
+        As of the recording.
+    unit : str
+        As of the recording.
+    health : Health
+        Counts of all readings; noise, drift, hum and mean of the longest stretch without a change
+        of load and without spikes, creep after the largest change.
+    spikes : int
+        Single readings far from both neighbours.
+    largest_spike : float
+        Their largest distance from the neighbours; 0 without spikes.
+    temperature_slope : float
+        Change of the reading with the temperature; NaN without a temperature.
+    temperature_slope_std : float
+        Its standard error.
+    remarks : tuple of str
+        What is wrong, or limits what can be concluded.
+    """
 
     name: str
-    """As of the recording."""
     unit: str
-    """As of the recording."""
     health: Health
-    """Counts of all readings; noise, drift, hum and mean of the longest stretch without a change of
-    load and without spikes, creep after the largest change."""
     spikes: int
-    """Single readings far from both neighbours."""
     largest_spike: float
-    """Their largest distance from the neighbours; 0 without spikes."""
     temperature_slope: float
-    """Change of the reading with the temperature; NaN without a temperature."""
     temperature_slope_std: float
-    """Its standard error."""
     remarks: tuple[str, ...]
-    """What is wrong, or limits what can be concluded."""
 
 
 def recorded_cell_health(path: str | Path, column: str | None = None) -> tuple[CellFindings, ...]:
