@@ -16,7 +16,11 @@ from winchkit.report.notebook import figures, html, text
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-_DIAGNOSIS = text.diagnosis_screen, html.diagnosis_cell, figures.result_figure
+_DIAGNOSIS: tuple[Callable[..., Any], ...] = (
+    text.diagnosis_screen,
+    html.diagnosis_cell,
+    figures.result_figure,
+)
 
 
 def _of_diagnosis(render: Callable[..., Any]) -> Callable[..., Any]:
