@@ -21,7 +21,7 @@ from winchkit.can_trace_lines import (
     is_marked,
 )
 from winchkit.errors import Fault, FileError
-from winchkit.regular_file import regular
+from winchkit.regular_file import read_whole, regular
 
 TRACED = 20_000
 """Bytes in which a trace is recognised."""
@@ -107,13 +107,7 @@ def read_trace(path: str | Path) -> CanTrace:
     in the notes. Raises FileError for a file that cannot be read, and for one without frames.
     """
     name = str(path)
-    try:
-        with open(path, "rb", opener=regular) as file:
-            data = file.read(LARGEST + 1)
-    except FileNotFoundError:
-        raise FileError(Fault("there is no such file", name)) from None
-    except (OSError, ValueError) as error:
-        raise FileError(Fault(f"cannot be read: {error}", name)) from None
+    data = read_whole(Path(path), "trace of CAN frames", LARGEST)
     if not data:
         raise FileError(Fault("the file is empty", name))
     if len(data) > LARGEST:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
@@ -10,7 +10,7 @@ from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term, modifiers_of
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.line import Line
-from winchkit.schema.profiles.winch import EffectTable, WinchProfile
+from winchkit.schema.profiles.winch import SHORTHANDS, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
 
 _BESIDE_PARAMETERS = {"id", "fitted"}
@@ -36,7 +36,7 @@ def check_profile(profile: WinchProfile, catalogue: Catalogue | None = None) -> 
 
 def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list[Fault]]:
     catalogue = catalogue_of(profile, catalogue)
-    terms = [_shorthand(catalogue[effect_id], values) for effect_id, values in _short(profile)]
+    terms = list(_shorthands(profile, catalogue))
     faults: list[Fault] = []
     for table in profile.effect:
         if table.id not in catalogue:
@@ -64,23 +64,13 @@ def not_in(catalogue: Catalogue, effect_id: str) -> str:
     return f"no effect '{effect_id}'{near}; {own}"
 
 
-def _short(profile: WinchProfile) -> list[tuple[str, dict[str, float]]]:
-    """Shorthand keys of a profile as effects."""
-    cable, efficiency = profile.cable, profile.gearbox.efficiency
-    short: list[tuple[str, dict[str, float]]] = []
-    if cable.axial_stiffness is not None:
-        short.append(("cable-elongation-linear", {"axial_stiffness": cable.axial_stiffness}))
-    if cable.mass_per_length is not None:
-        short.append(("cable-weight", {"mass_per_length": cable.mass_per_length}))
-    if efficiency is not None:
-        short.append(("gear-efficiency", {"efficiency": efficiency}))
-    if profile.motor.inertia is not None:
-        short.append(("rotor-inertia", {"inertia": profile.motor.inertia}))
-    return short
-
-
-def _shorthand(effect: Effect, values: Mapping[str, float]) -> Term:
-    return Term(effect, effect.null | dict(values))
+def _shorthands(profile: WinchProfile, catalogue: Catalogue) -> Iterator[Term]:
+    """Shorthand keys of a profile, whose names are those of the parameters, as effects."""
+    for key, effect_id in SHORTHANDS.items():
+        part, _, name = key.partition(".")
+        value = getattr(getattr(profile, part), name)
+        if value is not None:
+            yield Term(catalogue[effect_id], catalogue[effect_id].null | {name: value})
 
 
 def values_of(effect: Effect, table: EffectTable) -> tuple[dict[str, float], list[Fault]]:

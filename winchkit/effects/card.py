@@ -16,9 +16,9 @@ from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
+from winchkit.model.stages import OUTPUT_UNITS
 
 _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
-UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
 """Bars: half a terminal's line beside names and sizes."""
@@ -127,11 +127,8 @@ def in_control(effect: Effect) -> str:
     return f"left out: {reason}" if reason else "used for a winch's length or tension"
 
 
-def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
-    """The card as data, SI; ``width`` samples of the signature at most.
-
-    Returns: as ``winchkit effects ID --json`` prints it.
-    """
+def card_data(effect: Effect) -> dict[str, Any]:
+    """The card as data, SI, as ``winchkit effects ID --json`` prints it."""
     drawn = signature(effect)
     return {
         "id": effect.id,
@@ -150,10 +147,10 @@ def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
         "parameters": [_parameter_data(p, parameter_kind(effect, p)) for p in effect.parameters],
         "signature": {
             "values": dict(drawn.values),
-            "time": _listed(drawn.time, width),
-            "cable_length": _listed(drawn.cable_length, width),
+            "time": _listed(drawn.time),
+            "cable_length": _listed(drawn.cable_length),
             "changes": {
-                name: {"unit": UNITS[name], "values": _listed(change, width)}
+                name: {"unit": OUTPUT_UNITS[name], "values": _listed(change)}
                 for name, change in drawn.changes.items()
             },
         },
@@ -238,24 +235,22 @@ def _drawing(effect: Effect) -> list[str]:
     ]
     for name, change in drawn.changes.items():
         low, high = float(np.nanmin(change)), float(np.nanmax(change))
-        lines.append(f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {UNITS[name]}")
+        lines.append(
+            f"  {name:<13}{sparkline(change)}  {low:+.3g} to {high:+.3g} {OUTPUT_UNITS[name]}"
+        )
     return lines if drawn.changes else [*lines, "  no change on this motion"]
 
 
-def _listed(values: Array, width: int) -> list[float]:
-    """``width`` of the values at most, evenly spaced."""
-    index = np.linspace(0, len(values) - 1, min(width, len(values))).round().astype(int)
+def _listed(values: Array) -> list[float]:
+    """Values, evenly spaced where they are many."""
+    index = np.linspace(0, len(values) - 1, min(_SAMPLES, len(values))).round().astype(int)
     return list(values[index].tolist())
 
 
 def _parameter_data(parameter: Parameter, kind: str) -> dict[str, Any]:
+    names = ("name", "unit", "null", "typical", "low", "high")
     return {
-        "name": parameter.name,
-        "unit": parameter.unit,
-        "null": parameter.null,
-        "typical": parameter.typical,
-        "low": parameter.low,
-        "high": parameter.high,
+        **{name: getattr(parameter, name) for name in names},
         "kind": kind,
         "plausible": None if parameter.plausible is None else vars(parameter.plausible),
     }

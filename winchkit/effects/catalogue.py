@@ -134,10 +134,14 @@ def _of_wings() -> tuple[Effect, ...]:
 
 
 def _in_package(name: str) -> Iterator[Effect]:
-    """The effect of every module of a package."""
-    package = import_module(name)
-    for module in iter_modules(package.__path__):
-        yield import_module(f"{name}.{module.name}").EFFECT
+    """The effects of every module of a package."""
+    for module in iter_modules(import_module(name).__path__):
+        yield from _effects_of(import_module(f"{name}.{module.name}"))
+
+
+def _effects_of(module: object) -> list[Effect]:
+    """The module-level effects of a module."""
+    return [value for value in vars(module).values() if isinstance(value, Effect)]
 
 
 def _from_file(path: Path) -> list[Effect]:
@@ -169,10 +173,7 @@ def _from_file(path: Path) -> list[Effect]:
 
 def _effects_in(thing: object, where: str) -> list[Effect]:
     """Effects in a module, or the effect itself."""
-    if isinstance(thing, Effect):
-        effects = [thing]
-    else:
-        effects = [value for value in vars(thing).values() if isinstance(value, Effect)]
+    effects = [thing] if isinstance(thing, Effect) else _effects_of(thing)
     if not effects:
         raise FileError(Fault("has no object of class winchkit.effects.effect.Effect", where))
     faults = [

@@ -8,13 +8,29 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Dynamics, Parameter, Values
+from winchkit.effects.effect import Dynamics, Parameter, Plausible, Values
 from winchkit.model.friction import dahl
 from winchkit.model.recurrence import share
 from winchkit.model.stages import At
 
 START = Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed")
 """F/F_c at the first sample."""
+
+
+def sliding_distance(what: str) -> Parameter:
+    """The parameter ``distance`` of the motor after which ``what`` slide, rad."""
+    return Parameter(
+        "distance",
+        "rad",
+        null=0.1,
+        typical=0.1,
+        low=1e-6,
+        high=6.3,
+        role="shape",
+        grid=(0.001, 0.004, 0.016, 0.064),
+        along="motor_angle",
+        plausible=Plausible(0.0, 6.3, f"{what} slide within a motor turn"),
+    )
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from winchkit.effects.card import UNITS, signature, usual_values
+from winchkit.effects.card import signature, usual_values
 from winchkit.effects.effect import Effect, Values
+from winchkit.model.stages import OUTPUT_UNITS
 
 _ROUNDING = 1e-9
 """SI, of metres and newtons."""
@@ -23,7 +24,7 @@ def broken_promises(effect: Effect) -> list[str]:
     for name, change in still.changes.items():
         by = float(np.max(np.abs(change)))
         size = (
-            f"by up to {by:.3g} {UNITS[name]}"
+            f"by up to {by:.3g} {OUTPUT_UNITS[name]}"
             if np.isfinite(by)
             else "to a value that is not finite"
         )

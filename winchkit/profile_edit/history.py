@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from datetime import date
 from typing import Any
 
@@ -32,15 +32,7 @@ class HistoryStep:
 
     def to_json(self) -> dict[str, Any]:
         """The step as ``winchkit ledger --json`` prints it."""
-        return {
-            "did": self.did,
-            "effect": self.effect,
-            "date": self.date.isoformat(),
-            "runs": list(self.runs),
-            "before": dict(self.before),
-            "after": dict(self.after),
-            "noise": dict(self.noise),
-        }
+        return {**asdict(self), "date": self.date.isoformat(), "runs": list(self.runs)}
 
 
 def ladder(profile: WinchProfile | RobotProfile) -> tuple[HistoryStep, ...]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from platform import python_version
+from shlex import quote
 from typing import Any
 
 from winchkit import wings
@@ -44,34 +44,34 @@ class CommandLine:
 
     def compare(self, profile: str) -> str:
         """Command that compares the runs with a profile."""
-        return f"winchkit compare {self._runs} --profile {_quoted(profile)}{self._options}"
+        return f"winchkit compare {self._runs} --profile {quote(profile)}{self._options}"
 
     def diagnose(self, profile: str) -> str:
         """Command that diagnoses a profile."""
-        diagnose = f"winchkit diagnose {self._runs} --profile {_quoted(profile)}{self._options}"
+        diagnose = f"winchkit diagnose {self._runs} --profile {quote(profile)}{self._options}"
         return f"{diagnose} --html report.html"
 
     def add(self, effect: str, profile: str, better: str) -> str:
         """Command that writes the extended profile."""
-        named = f"{_quoted(effect)} --profile {_quoted(profile)}"
-        return f"winchkit add {named} --fit {self._runs} -o {_quoted(better)}{self._options}"
+        named = f"{quote(effect)} --profile {quote(profile)}"
+        return f"winchkit add {named} --fit {self._runs} -o {quote(better)}{self._options}"
 
     def calibrate(self, profile: str, better: str) -> str:
         """Command that fits a robot's geometry."""
-        return f"winchkit calibrate {_quoted(profile)} {self._runs} -o {_quoted(better)}"
+        return f"winchkit calibrate {quote(profile)} {self._runs} -o {quote(better)}"
 
     def begin_effect(self, profile: str, file: str) -> str:
         """Command that creates a user effect from the residual."""
-        named = f"{_quoted(file)} --profile {_quoted(profile)}"
+        named = f"{quote(file)} --profile {quote(profile)}"
         return f"winchkit effects new {named} --fit {self._runs}{self._options}"
 
     @property
     def _runs(self) -> str:
-        return " ".join(map(_quoted, self.dataset.run_files))
+        return " ".join(map(quote, self.dataset.run_files))
 
     @property
     def _options(self) -> str:
-        return "".join(f" {_quoted(option)}" for option in self.options)
+        return "".join(f" {quote(option)}" for option in self.options)
 
 
 def repeat(
@@ -110,7 +110,3 @@ def _runs(dataset: Dataset) -> Markup:
         )
     head = ["run", "programme", "repeats", "samples", "length", "excluded"]
     return table("Runs; those of one set are repeats of each other.", head, rows, words=3)
-
-
-def _quoted(text: str) -> str:
-    return shlex.quote(text)

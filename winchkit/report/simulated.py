@@ -10,7 +10,7 @@ from winchkit.dynamics.comparison import SimulatedError
 from winchkit.quantity_text import quantity
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import decimated
-from winchkit.report.words.columns import aligned, paragraph
+from winchkit.report.words.columns import aligned, entries
 
 _INTERVALS = 1000
 """Intervals of a drawing, two per pixel of its width."""
@@ -30,10 +30,10 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
                 f"{e.run}: after {quantity(e.meaningful_until, 's')} the comparison means nothing: "
                 "the uncertain initial speed alone makes an error as large as that of the model"
             )
-            lines += paragraph(text, "  ", "    ")
+            lines += entries([text])
     if all(e.meaningful_until is None for e in errors if e.driven_by == "torque"):
         text = "the uncertain initial speed makes a smaller error than the model, to the end"
-        lines += paragraph(text, "  ", "    ")
+        lines += entries([text])
     return "\n".join(lines)
 
 

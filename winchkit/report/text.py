@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,7 @@ from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
-from winchkit.report.words.columns import aligned, hanging, paragraph
+from winchkit.report.words.columns import aligned, entries, hanging, joined, paragraph
 from winchkit.report.words.headline import comparison_headline, noise_text
 from winchkit.report.words.sentence import (
     changes_text,
@@ -104,7 +104,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         ]
     if verbose or diagnosis.interrupted:
         blocks.append(_candidates(answer))
-    lines = [line for block in blocks if block for line in (*block, "")][:-1]
+    lines = joined(blocks).split("\n")
     if len(lines) > _MOST_LINES and not verbose:
         lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
     text = "\n".join(lines)
@@ -162,25 +162,24 @@ def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
     """
     blocks = [paragraph(f"{comparison_headline(comparison)}.")]
     if comparison.outputs and not verbose:
-        lines = [line for text in failing(comparison) for line in paragraph(text, "  ", "    ")]
+        lines = entries(failing(comparison))
         blocks += [aligned(short_rows(comparison)), ["where it fails", *lines] if lines else []]
     elif comparison.outputs:
         blocks += _tables(comparison)
     blocks += [*_data(comparison, all_shares=verbose), _notes(comparison.notes)]
-    return _joined(blocks)
+    return joined(blocks)
 
 
 def _tables(comparison: Comparison) -> list[list[str]]:
     """All figures of a comparison, with the attribution of its errors to variables."""
-    attributed: list[str] = []
-    for name, error in comparison.outputs.items():
-        text = f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
-        attributed += paragraph(text, "  ", "    ")
+    attributed = entries(
+        f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
+        for name, error in comparison.outputs.items()
+    )
     blocks = [aligned([HEAD, *size_rows(comparison)])]
     if attributed:
         blocks.append(["share of the error's variance explained by", *attributed])
-    maps = [line for text in map_lines(comparison) for line in paragraph(text, "  ", "    ")]
-    if maps:
+    if maps := entries(map_lines(comparison)):
         blocks.append(["mean error over two variables", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
@@ -206,7 +205,7 @@ def addition_text(addition: Addition | Removal) -> str:
         error_lines(addition.outputs, extended=True),
         _notes(addition.notes),
     ]
-    return _joined(blocks)
+    return joined(blocks)
 
 
 def error_lines(
@@ -283,17 +282,14 @@ def _shown(answer: Answer) -> list[str]:
     lines = [head, *aligned(soonest, words=2)]
     large = [f"{r.effect} ({significant(r.share, 2)} ×)" for r in rows if r.share > 1.0]
     if large:
-        text = f"visible only if larger than usual: {', '.join(large)}"
-        lines += paragraph(text, "  ", "    ")
+        lines += entries([f"visible only if larger than usual: {', '.join(large)}"])
     never = [row.effect for row in rows if isnan(row.share)]
     if never:
-        lines += paragraph(f"cannot be seen in these runs: {', '.join(never)}", "  ", "    ")
+        lines += entries([f"cannot be seen in these runs: {', '.join(never)}"])
     if large or never:
         lines.append("  'winchkit plan' proposes runs that detect most of them")
     if blind:
-        lines += paragraph(
-            f"not tested, a part or a channel is missing: {', '.join(blind)}", "  ", "    "
-        )
+        lines += entries([f"not tested, a part or a channel is missing: {', '.join(blind)}"])
     return lines
 
 
@@ -310,7 +306,7 @@ def _confusion(diagnosis: Diagnosis) -> list[str]:
     ]
     if determined:
         lines.append("determined by the data")
-        lines += [line for text in determined for line in paragraph(text, "  ", "    ")]
+        lines += entries(determined)
     return lines
 
 
@@ -325,7 +321,7 @@ def _correlations(diagnosis: Diagnosis) -> list[str]:
     more = len(diagnosis.fit.correlations) - len(pairs)
     text = "; ".join(pairs) + (f"; {more} more in --json" if more else "")
     condition = f"; condition number {significant(diagnosis.fit.condition, 2)}"
-    return ["correlation of fitted values", *paragraph(text + condition, "  ", "    ")]
+    return ["correlation of fitted values", *entries([text + condition])]
 
 
 def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
@@ -338,13 +334,11 @@ def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
     if not verbose:
         listed = remaining_patterns(diagnosis)[:2] if diagnosis.verdict != "explained" else []
     for where in listed:
-        lines += paragraph(where_text(where), "  ", "    ")
+        lines += entries([where_text(where)])
         if not where.frequency:
             lines.append(f"    {_shape(answer, where)}")
     if lines and diagnosis.empirical:
-        name = diagnosis.empirical[0]
-        text = f"'winchkit add {name}' adds it as a curve"
-        lines += paragraph(text, "  ", "    ")
+        lines += entries([f"'winchkit add {diagnosis.empirical[0]}' adds it as a curve"])
     share = told.partition(" Main pattern")[0]
     head = "patterns of the residual" if not share or share.startswith("Main") else share
     return [head, *lines] if lines or share else []
@@ -360,12 +354,12 @@ def _shape(answer: Answer, where: Attribution) -> str:
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:
-    lines = []
+    texts = []
     for run in diagnosis.next_runs[:_FEW]:
         power = "" if isnan(run.power) else f" (power {percent(run.power)})"
         between = f"{' / '.join(run.separates)}: " if run.separates else ""
-        lines += paragraph(f"{between}{run.programme}{power}", "  ", "    ")
-    return ["next runs", *lines] if lines else []
+        texts.append(f"{between}{run.programme}{power}")
+    return ["next runs", *entries(texts)] if texts else []
 
 
 def _candidates(answer: Answer) -> list[str]:
@@ -389,18 +383,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     limit = 2.0 if all_shares else _USED
     used = used_text({name: s for name, s in result.used_share.items() if s < limit})
     blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}
-    return [
-        [head, *(line for text in texts for line in paragraph(text, "  ", "    "))]
-        for head, texts in blocks.items()
-        if texts
-    ]
+    return [[head, *entries(texts)] for head, texts in blocks.items() if texts]
 
 
 def _notes(notes: Sequence[str]) -> list[str]:
-    lines = [line for note in notes for line in paragraph(note, "  ", "    ")]
-    return ["notes", *lines] if lines else []
-
-
-def _joined(blocks: Iterable[Sequence[str]]) -> str:
-    """Blocks of lines with an empty line between them; empty blocks are left out."""
-    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+    return ["notes", *entries(notes)] if notes else []

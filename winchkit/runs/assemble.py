@@ -23,14 +23,15 @@ _LATEST = 9.2e9
 
 @dataclass
 class RawColumns:
-    """A file's columns before conversion; ``line_of`` gives the line of a row."""
+    """A file's columns before conversion."""
 
     path: str
     header: Sequence[tuple[str, str]]
     """Name and unit of each column."""
     columns: Sequence[Array | None]
     """Values in the file's units; None for an unknown column with text."""
-    line_of: Callable[[int], int | None]
+    line_of: Callable[[int], int | None] = lambda _row: None
+    """Line of a row; None where the source has no lines."""
     metadata: Mapping[str, str] = field(default_factory=dict)
     metadata_lines: Mapping[str, int] = field(default_factory=dict)
     header_line: int | None = None
@@ -169,8 +170,15 @@ def _time_faults(recording: RawColumns, time: Array) -> Iterator[Fault]:
             "seconds: write its unit, e.g. 'time [ms]'"
         )
         yield Fault(message, recording.path, recording.line_of(int(row)))
+    yield from order_faults(recording.path, time, recording.line_of)
+
+
+def order_faults(
+    path: str, time: Array, line_of: Callable[[int], int | None], origin: float = 0.0
+) -> Iterator[Fault]:
+    """Times (n,), s after ``origin``, that are not later than the one before."""
     for row in np.flatnonzero(time[1:] <= time[:-1]) + 1:
-        earlier, later = time[row - 1], time[row]
+        earlier, later = origin + time[row - 1], origin + time[row]
         word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
         message = f"time {word} {later:.9g} s; rows must come in order of time, each once"
-        yield Fault(message, recording.path, recording.line_of(int(row)))
+        yield Fault(message, path, line_of(int(row)))

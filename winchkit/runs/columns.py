@@ -6,8 +6,7 @@ import re
 from difflib import get_close_matches
 
 from winchkit.errors import suggest
-from winchkit.runs.run import CHANNEL_DIMENSIONS
-from winchkit.schema.mapping import POSE_DIMENSIONS, POSITION, QUATERNION
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS, POSE_DIMENSIONS, POSITION, QUATERNION
 from winchkit.units import GRAVITY, UNITS, dimension_of
 
 _TRACKER_DIMENSIONS: dict[str, str] = {

@@ -83,8 +83,7 @@ def aligned(log: Log) -> Run:
         log.path,
         log.layout.columns(),
         list(table.T.copy()),
-        lambda _row: None,
-        log.metadata,
+        metadata=log.metadata,
         notes=log.notes,
     )
     return assemble(recording)

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.columns import unit_fault
-from winchkit.runs.run import CHANNEL_DIMENSIONS, Channel, Run
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 from winchkit.units import factor
 
 OF_OUTPUT = {"motor_torque": "predicted_torque", "force": "predicted_force"}

@@ -16,28 +16,6 @@ from winchkit.units import parse
 
 ANGLE_INTEGRATED = "integral of motor_velocity"
 """Metadata ``motor_angle`` of a run whose recording has no angle."""
-CHANNEL_DIMENSIONS: dict[str, str] = {
-    "motor_angle": "angle",
-    "motor_velocity": "angular speed",
-    "motor_torque": "torque",
-    "predicted_torque": "torque",
-    "motor_current": "current",
-    "tension": "force",
-    "tension_gross": "force",
-    "load": "force",
-    "load_gross": "force",
-    "cable_length": "length",
-    "cable_length_gross": "length",
-    "temperature": "temperature",
-    "swivel": "angle",
-    "position": "length",
-    "velocity": "speed",
-    "force": "force",
-    "predicted_force": "force",
-}
-"""Dimension of every channel that the model uses, of a winch or of a linear axis."""
-
-
 _GAP = 2.5
 """Shortest gap in median intervals, as in the comparison: one missing sample and jitter."""
 _WHOLE = 0.05

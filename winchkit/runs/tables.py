@@ -73,20 +73,12 @@ def run_of(
     named = name or texts.pop(_NAME, "") or "table"
     texts.pop(_NAME, None)
     columns = [_numbers(column) for column in found.columns]
-    recording = RawColumns(
-        named, header, columns, _no_line, metadata={**texts, **dict(metadata or {})}
-    )
+    recording = RawColumns(named, header, columns, metadata={**texts, **dict(metadata or {})})
     return replace(assemble(recording), name=named, path="")
 
 
 _OF_PROGRAMS = frozenset({"pandas", "ARROW:schema"})
 """Metadata that other programs write for themselves."""
-
-
-def _no_line(row: int) -> int | None:
-    """Rows of a table in memory have no line in a file."""
-    del row
-    return None
 
 
 def _numbers(column: Any) -> Array | None:

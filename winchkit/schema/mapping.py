@@ -33,7 +33,7 @@ VECTOR, EULER = "rotation vector", "angles of Rx Ry Rz"
 """How roll, pitch and yaw are stored as the components of a rotation vector, or as the angles of
 another product than Rz Ry Rx."""
 
-_OF_A_WINCH = {
+CHANNEL_DIMENSIONS: dict[str, str] = {
     **{"motor_angle": "angle", "motor_velocity": "angular speed"},
     **{"motor_torque": "torque", "motor_current": "current", "predicted_torque": "torque"},
     **dict.fromkeys(("tension", "tension_gross", "load", "load_gross"), "force"),
@@ -42,10 +42,11 @@ _OF_A_WINCH = {
     **{"position": "length", "velocity": "speed"},
     **dict.fromkeys(("force", "predicted_force"), "force"),
 }
+"""Dimension of every channel that the model uses, of a winch or of a linear axis."""
 CHANNELS: dict[str, str] = {
     "time": "time",
     DATE: "time",
-    **_OF_A_WINCH,
+    **CHANNEL_DIMENSIONS,
     **POSE_DIMENSIONS,
     **dict.fromkeys(MATRIX, "ratio"),
 }
@@ -91,7 +92,7 @@ class MappedColumn(Table):
     def rules(self) -> Iterator[Rule]:
         """The channel exists, and the factor is known."""
         name = self.channel if self.channel in CHANNELS else self.channel.rpartition(".")[2]
-        if name not in CHANNELS or (name != self.channel and name not in _OF_A_WINCH):
+        if name not in CHANNELS or (name != self.channel and name not in CHANNEL_DIMENSIONS):
             message = f"'{self.channel}' is no channel of a run; use one of {', '.join(CHANNELS)}"
             yield "channel", message + suggest(name, list(CHANNELS))
         dimension = CHANNELS.get(name)

@@ -9,8 +9,7 @@ import pytest
 
 from winchkit.arrays import Array
 from winchkit.errors import RunError
-from winchkit.runs.importing.clocks.joint import joined
-from winchkit.runs.importing.clocks.lag import agreement_of
+from winchkit.runs.importing.clocks.joint import agreement_of, joined
 from winchkit.runs.importing.streams import Stream, Streams
 
 LAG, DRIFT = 3.2173, 80e-6

@@ -19,8 +19,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.names import meaning_of, words_of
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
-from winchkit.runs.run import CHANNEL_DIMENSIONS
-from winchkit.schema.mapping import CHANNELS, DATE, MATRIX, POSE_DIMENSIONS
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS, CHANNELS, DATE, MATRIX, POSE_DIMENSIONS
 from winchkit.units import UNITS
 
 TURN = 2 * math.pi

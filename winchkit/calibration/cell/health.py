@@ -242,14 +242,19 @@ def _scale(raw: Array, value: Array) -> float:
     return float(np.ptp(value)) / spread if spread > 0 else math.nan
 
 
-def _with_remarks(health: Health, duration: float) -> Health:
-    """The figures with remarks, worst first."""
-    remarks: list[str] = []
-    lost = health.readings - health.usable
+def lost_readings(health: Health) -> list[str]:
+    """Remarks on readings that are saturated or not usable for another reason."""
+    remarks, lost = [], health.readings - health.usable - health.saturated
     if health.saturated:
         remarks.append(f"{health.saturated} readings are saturated: overload or a broken wire")
-    if lost > health.saturated:
-        remarks.append(f"{lost - health.saturated} readings are unusable")
+    if lost > 0:
+        remarks.append(f"{lost} readings are unusable")
+    return remarks
+
+
+def _with_remarks(health: Health, duration: float) -> Health:
+    """The figures with remarks, worst first."""
+    remarks = lost_readings(health)
     if health.unique == 1:
         remarks.append("the counts never change: a frozen cell, or a division far above its noise")
     elif health.noise_counts < 0.5:

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from winchkit.arguments import path_of
 from winchkit.arrays import Array
-from winchkit.calibration.cell.health import CellSamples, Health, examine, line_fit, step_at
+from winchkit.calibration.cell.health import (
+    CellSamples,
+    Health,
+    examine,
+    line_fit,
+    lost_readings,
+    step_at,
+)
 from winchkit.drivers.reading import Quality
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.answers import Answers, read_column
@@ -24,7 +31,7 @@ from winchkit.runs.log import Log
 from winchkit.runs.read import read_log
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.inspection import inspect_run
-from winchkit.runs.sanity.outliers import outlier_mask
+from winchkit.runs.sanity.outliers import outlier_mask, spike_size
 from winchkit.runs.sanity.quantisation import resolution
 from winchkit.schema.mapping import DATE
 
@@ -237,10 +244,7 @@ def examine_recording(recording: CellRecording) -> CellFindings:
     )
     remarks = [*_of_spikes(value, spikes, recording.unit), *found.remarks]
     remarks += [text for text in whole.remarks if "creep" in text]
-    if saturated := health.saturated:
-        remarks.append(f"{saturated} readings are saturated: overload or a broken wire")
-    if lost := health.readings - health.usable - saturated:
-        remarks.append(f"{lost} readings are unusable")
+    remarks += lost_readings(health)
     # The rest of a sentence on the clock concerns derivatives, of which a cell has none.
     remarks += [
         item.text.partition(":")[0] if item.code == "clock-jitter" else item.text
@@ -258,7 +262,7 @@ def examine_recording(recording: CellRecording) -> CellFindings:
         recording.unit,
         health,
         int(spikes.sum()),
-        _distance(value, spikes),
+        spike_size(value, spikes),
         slope,
         std,
         tuple(remarks),
@@ -287,14 +291,6 @@ _CODES = ("saturated", "repeated-values", "gap", "clock-jitter", "quantised", "l
 """Findings of a run's inspection that concern a cell alone."""
 
 
-def _distance(value: Array, spikes: NDArray[np.bool_]) -> float:
-    good = ~spikes & np.isfinite(value)
-    if not spikes.any():
-        return 0.0
-    between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), value[good])
-    return float(np.max(np.abs(value[spikes] - between)))
-
-
 def _of_spikes(value: Array, spikes: NDArray[np.bool_], unit: str) -> Iterator[str]:
     inner = spikes.copy()
     for end, words in ((0, "first"), (-1, "last")):
@@ -306,7 +302,7 @@ def _of_spikes(value: Array, spikes: NDArray[np.bool_], unit: str) -> Iterator[s
         return
     text = (
         f"{count} of {len(value)} readings are single spikes of up to "
-        f"{_distance(value, inner):.3g} {unit}; they are left out of all figures"
+        f"{spike_size(value, inner):.3g} {unit}; they are left out of all figures"
     )
     for bits in _BITS:
         half = 2.0 ** (bits - 1)

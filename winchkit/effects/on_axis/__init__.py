@@ -1,4 +1,4 @@
-"""Effects on the torque of an axis without a cable, or of a direct drive; one per file.
+"""Effects on the torque of an axis without a cable, or of a direct drive.
 
-Each file defines ``EFFECT``, which :func:`winchkit.load_catalogue` collects.
+:func:`winchkit.load_catalogue` collects the effects of every file.
 """

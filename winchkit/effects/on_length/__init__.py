@@ -1,4 +1,4 @@
-"""Effects on the cable length, from the motor angle on; one per file.
+"""Effects on the cable length, from the motor angle on.
 
-Each file defines ``EFFECT``, which :func:`winchkit.load_catalogue` collects.
+:func:`winchkit.load_catalogue` collects the effects of every file.
 """

@@ -1,4 +1,4 @@
-"""Effects on the tension, from the load to the cell's reading; one per file.
+"""Effects on the tension, from the load to the cell's reading.
 
-Each file defines ``EFFECT``, which :func:`winchkit.load_catalogue` collects.
+:func:`winchkit.load_catalogue` collects the effects of every file.
 """

@@ -1,4 +1,4 @@
-"""Effects on the motor torque, from the cable force on; one per file.
+"""Effects on the motor torque, from the cable force on.
 
-Each file defines ``EFFECT``, which :func:`winchkit.load_catalogue` collects.
+:func:`winchkit.load_catalogue` collects the effects of every file.
 """

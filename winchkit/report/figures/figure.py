@@ -39,7 +39,7 @@ class FigureAxis:
     @property
     def label(self) -> str:
         """Name with the unit: ``time [s]``."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
+        return headed(self.name, self.unit)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def _series_table(figure: Figure) -> FigureData:
         for index in indices:
             columns[index][at : at + len(own_x)] = every[index][1].y
         at += len(own_x)
-    head = [figure.x.label, *(_headed(one.name, panel.y.unit) for panel, one in every)]
+    head = [figure.x.label, *(headed(one.name, panel.y.unit) for panel, one in every)]
     data = [_numbers(column) for column in (x, *columns)]
     if figure.names:
         places: list[float | None] = [int(place) - 1 for place in x]
@@ -200,7 +200,7 @@ def _category_table(figure: Figure) -> FigureData:
         found = dict(zip(one.y.tolist(), one.x.tolist(), strict=True))
         values = [found.get(place, float("nan")) for place, _ in panel.y.categories]
         columns.append(_numbers(values))
-        head.append(_headed(f"{figure.x.name}, {one.name}", figure.x.unit))
+        head.append(headed(f"{figure.x.name}, {one.name}", figure.x.unit))
     return FigureData(tuple(head), tuple(columns), names)
 
 
@@ -230,14 +230,15 @@ def _cells_table(figure: Figure, cells: GridCells) -> FigureData:
         cells.y_edges[up + 1],
         cells.values[across, up],
     ]
-    head.append(_headed(cells.name, cells.unit))
+    head.append(headed(cells.name, cells.unit))
     if cells.counts is not None:
         head.append("samples")
         columns.append(cells.counts[across, up].astype(float))
     return FigureData(tuple(head), tuple(_numbers(column) for column in columns))
 
 
-def _headed(name: str, unit: str) -> str:
+def headed(name: str, unit: str) -> str:
+    """``name [unit]``, or the name alone without a unit."""
     return f"{name} [{unit}]" if unit else name
 
 

@@ -50,7 +50,7 @@ def error_ladder(
 
 
 def fleet_ladders(
-    found: Mapping[str, Comparison] | Mapping[str, Diagnosis], source: str = ""
+    found: Mapping[str, Comparison] | Mapping[str, Diagnosis],
 ) -> list[Figure]:
     """A ladder per output with a row per winch, the output with the largest ratio first."""
     out: list[tuple[float, Figure]] = []
@@ -67,7 +67,7 @@ def fleet_ladders(
             title = capital(f"{name}: error over the noise")
             changed = "with named effects" if extended else ""
             worst = max(row.before for row in rows)
-            out.append((worst, _figure(f"errors-{output}", title, rows, changed, source)))
+            out.append((worst, _figure(f"errors-{output}", title, rows, changed, "")))
     return [figure for _, figure in sorted(out, key=lambda item: -item[0])]
 
 

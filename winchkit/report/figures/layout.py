@@ -17,7 +17,14 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.quantity_text import plain
 from winchkit.report.figures.axes import Range, range_of
-from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, GridCells, Panel
+from winchkit.report.figures.figure import (
+    Figure,
+    FigureAxis,
+    FigureSeries,
+    GridCells,
+    Panel,
+    headed,
+)
 from winchkit.report.figures.tokens import STYLES
 
 WIDE, NARROW = 700, 340
@@ -163,12 +170,8 @@ def _heading(panel: Panel) -> str:
     text = panel.y.label
     if panel.band is not None:
         unit = f" {panel.y.unit}" if panel.y.unit else ""
-        text += f"; band: noise floor ±{_three(panel.band)}{unit}"
+        text += f"; band: noise floor ±{plain(panel.band, 3)}{unit}"
     return text
-
-
-def _three(value: float) -> str:
-    return plain(value, 3)
 
 
 def _head(build: _Build, figure: Figure) -> float:
@@ -343,7 +346,7 @@ def _scale(build: _Build, figure: Figure, left: float, height: float) -> float:
     cells = next((p.cells for p in figure.panels if p.cells is not None), None)
     if cells is None:
         return height
-    name = f"{cells.name} [{cells.unit}]" if cells.unit else cells.name
+    name = headed(cells.name, cells.unit)
     if cells.signed:
         count = len(cells.levels)
         styles = [f"below-{n}" for n in range(count, 0, -1)] + ["neutral"]

@@ -45,22 +45,14 @@ def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
         noise = answer.diagnosis.outputs[where.output].noise_rms
     output = OUTPUT_NAMES.get(where.output, where.output)
     over = VARIABLE_NAMES.get(where.variable, where.variable)
+    means = FigureSeries("residual, mean", "today", how.shown(at), residual / scale.worth, "mean")
+    band = None if noise is None else noise / scale.worth
     return Figure(
         f"pattern-{where.output}",
         capital(f"{output}, mean residual over {over}"),
         f"Mean residual: {where_text(where)}.",
         how.axis(),
-        (
-            Panel(
-                FigureAxis("residual", scale.label, zero=True),
-                (
-                    FigureSeries(
-                        "residual, mean", "today", how.shown(at), residual / scale.worth, "mean"
-                    ),
-                ),
-                None if noise is None else noise / scale.worth,
-            ),
-        ),
+        (Panel(FigureAxis("residual", scale.label, zero=True), (means,), band),),
         source=source,
     )
 
@@ -95,24 +87,16 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
     how = reading(over.variable, within_turn=over.order is not None)
     scale = scale_for(3 * float(abs(at.mean).max()), LADDER_UNITS[over.output])
     output, variable = OUTPUT_NAMES.get(over.output, over.output), variable_name(over.variable)
+    drawn = tuple(
+        FigureSeries(name, tone, how.shown(curve.x), curve.mean / scale.worth, "mean")
+        for name, tone, curve in (("to explain, mean", "today", at), (step.effects[0], "with", law))
+    )
     return Figure(
         f"law-{step.effects[0]}",
         capital(f"{output} over {variable}, and the closest law"),
         f"Mean residual without {step.effects[0]}, and what this law explains of it; 'winchkit add "
         f"{empirical_id(over.output, over.variable)}' adds the curve.",
         how.axis(),
-        (
-            Panel(
-                FigureAxis("residual", scale.label, zero=True),
-                (
-                    FigureSeries(
-                        "to explain, mean", "today", how.shown(at.x), at.mean / scale.worth, "mean"
-                    ),
-                    FigureSeries(
-                        step.effects[0], "with", how.shown(law.x), law.mean / scale.worth, "mean"
-                    ),
-                ),
-            ),
-        ),
+        (Panel(FigureAxis("residual", scale.label, zero=True), drawn),),
         source=source,
     )

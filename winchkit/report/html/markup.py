@@ -48,15 +48,18 @@ def section(id_: str, heading: str, *children: str) -> Markup:
     return element("section", title, *children, id=id_, aria_labelledby=f"{id_}-heading")
 
 
-def folded(id_: str, heading: str, *children: str, beside: str = "") -> Markup:
-    """A section to be opened, with a remark beside its heading; empty without content."""
+def folded(id_: str, heading: str, *children: str) -> Markup:
+    """A section to be opened; empty without content."""
     if not any(children):
         return Markup("")
-    title = element("h2", heading, id=f"{id_}-heading")
-    head = element(
-        "summary", title, *([element("span", beside, class_="beside")] if beside else [])
-    )
+    head = element("summary", element("h2", heading, id=f"{id_}-heading"))
     return element("details", head, *children, id=id_, class_="section")
+
+
+def facts(pairs: Iterable[tuple[str, str]], class_: str = "facts") -> Markup:
+    """A list of names and their texts; names without a text are left out."""
+    parts = [p for name, text in pairs if text for p in (element("dt", name), element("dd", text))]
+    return element("dl", *parts, class_=class_)
 
 
 def details(summary: str, *children: str) -> Markup:

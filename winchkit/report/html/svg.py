@@ -33,9 +33,9 @@ def page_svg(figure: Figure, width: float = WIDE) -> Markup:
     return join([shared, _of_page(figure, wide, "at-wide"), _of_page(figure, narrow, "at-narrow")])
 
 
-def file_svg(figure: Figure, width: float = WIDE) -> str:
+def file_svg(figure: Figure) -> str:
     """A figure as an SVG file in the light theme, with its source below."""
-    scene = scene_of(figure, width, source=True)
+    scene = scene_of(figure, source=True)
     drawn = element(
         "svg",
         element("title", figure.title),
@@ -79,13 +79,12 @@ def _body(figure: Figure, scene: Scene, *, styled: bool) -> Iterable[Markup]:
     if not styled:
         size = {"width": _px(scene.width + 24), "height": _px(scene.height + 16)}
         yield element("rect", x="-12", y="-8", **size, **_style("ground", styled=styled))
-    bands = [(n, area) for n, area in enumerate(scene.areas)]
     for rule in scene.rules:
         ends = {"x1": rule.x1, "y1": rule.y1, "x2": rule.x2, "y2": rule.y2}
         own = {k: _px(v) for k, v in ends.items()}
         name = "xmark" if rule.style == "axis" and rule.x1 == rule.x2 else ""
         yield element("line", **own, **_style(rule.style, styled=styled, more=name))
-    for number, area in bands:
+    for number, area in enumerate(scene.areas):
         yield _zoomed(figure, number, area) if styled else _clipped(f"{figure.id}-{number}", area)
     for number, area in enumerate(scene.swatches):
         yield _clipped(f"{figure.id}-s{number}", area, styled=styled, clip=False)

@@ -1,16 +1,16 @@
-"""Figures of runs and results by matplotlib, with a unit on every axis."""
+"""Figures of runs, results and profiles by matplotlib, with a unit on every axis."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.residuals.traces import OutputTrace, PoseTrace
 from winchkit.diagnosis.results import Comparison, Diagnosis
+from winchkit.effects.bind import line_of
 from winchkit.errors import UsageError, suggest
 from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.reduction import decimated
@@ -18,6 +18,8 @@ from winchkit.report.notebook.style import BLACK, BLUE, GREY, ORANGE, WIDTH, Siz
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.profiles.winch import WinchProfile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +36,9 @@ _CHANNELS = 8
 """Channels that are drawn without a choice: about one screen."""
 _GAP = 0.02
 """Gap between runs that follow each other, as a share of the whole time."""
+_LENGTHS = 400
+"""Points of a curve, one for two or three pixels."""
+_TURN = 2 * np.pi
 
 
 def result_figure(
@@ -72,11 +77,6 @@ def result_figure(
     return figure
 
 
-def answer_figure(answer: Answer, **options: Any) -> Figure:
-    """Figure of the diagnosis of an answer; options as of :func:`result_figure`."""
-    return result_figure(answer.diagnosis, **options)
-
-
 def run_figure(
     run: Run, *, channels: str | Sequence[str] | None = None, figsize: Size = None
 ) -> Figure:
@@ -100,6 +100,32 @@ def run_figure(
         axes[0].set_title(run.name, loc="left")
         axes[-1].set_xlabel("time [s]")
         figure.align_ylabels()
+    return figure
+
+
+def winch_figure(profile: WinchProfile, *, figsize: Size = None) -> Figure:
+    """Motor angle, and cable per drum angle, over the cable length.
+
+    ``figsize``: width and height, inches.
+    """
+    longest = profile.reference.cable_length
+    if isinstance(profile, AxisProfile) or not longest:
+        raise UsageError(
+            f"profile '{profile.name}' has no reference.cable_length: there is no cable to draw"
+        )
+    line = line_of(profile)
+    lengths = np.linspace(0.0, longest, _LENGTHS)
+    angles = line.nominal_motor_angle(lengths)
+    arms = np.array([line.arm(float(angle)) for angle in angles]) * profile.gearbox.ratio
+    with new_figure(figsize or (WIDTH, 2.4)) as figure:
+        left, right = figure.subplots(1, 2)
+        left.plot(lengths, angles / _TURN, color=BLUE)
+        left.set_ylabel("Motor angle [turns]")
+        right.plot(lengths, np.abs(arms) * 1e3, color=BLUE)
+        right.set_ylabel("Cable per drum angle [mm/rad]")
+        for axis in (left, right):
+            axis.set_xlabel("cable length [m]")
+        figure.suptitle(profile.name, x=0.0, ha="left", fontsize=8)
     return figure
 
 

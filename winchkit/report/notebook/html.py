@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.quantity_text import unbroken
@@ -81,11 +80,6 @@ def diagnosis_cell(diagnosis: Diagnosis) -> str:
         tables.steps(diagnosis),
         tables.figures(diagnosis),
     )
-
-
-def answer_cell(answer: Answer) -> str:
-    """The diagnosis of an answer."""
-    return diagnosis_cell(answer.diagnosis)
 
 
 def addition_cell(addition: Addition | Removal) -> str:

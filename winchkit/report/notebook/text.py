@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.quantity_text import grouped, percent, significant
 from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.text import addition_text, compare_text, error_lines, head_lines, step_lines
-from winchkit.report.words.columns import aligned, hanging, paragraph
+from winchkit.report.words.columns import aligned, hanging, joined, paragraph
 from winchkit.report.words.sentence import changes_text, remaining_text
 from winchkit.runs.run import Run
 
@@ -95,13 +94,7 @@ def diagnosis_screen(diagnosis: Diagnosis) -> str:
         paragraph(remaining_text(diagnosis)),
         [] if diagnosis.interrupted else paragraph(changes_text(diagnosis)),
     ]
-    lines = [line for block in blocks if block for line in (*block, "")][:-1]
-    return screen("\n".join(lines), "; fit_report() and to_json() have all")
-
-
-def answer_screen(answer: Answer) -> str:
-    """The diagnosis of an answer."""
-    return diagnosis_screen(answer.diagnosis)
+    return screen(joined(blocks), "; fit_report() and to_json() have all")
 
 
 def addition_screen(addition: Addition | Removal) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.add import Addition
-from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.diagnosis.results import OutputFit
 from winchkit.quantity_text import scale_for, significant
 from winchkit.report import tables
 from winchkit.report.figures.figure import Figure
@@ -34,9 +34,9 @@ def addition_sections(
     ladder: Figure | None = None,
 ) -> Markup:
     """Content of the page; ``better`` is the profile that was written."""
-    effect = addition.added[0].effect.id
+    term, values = addition.added
     commands = [
-        command.add(effect, command.profile, better),
+        command.add(term.effect.id, command.profile, better),
         command.compare(better),
         command.diagnose(better),
     ]
@@ -44,7 +44,11 @@ def addition_sections(
         [
             _lead(addition, better, command, title=title, ladder=ladder),
             element("div", *figures, id="residuals"),
-            folded("effects", "Added effect: formula and source", _added(addition)),
+            folded(
+                "effects",
+                "Added effect: formula and source",
+                tables.named([(term.effect, term.label, values)]),
+            ),
             folded("parameters", "All effects of the new profile", _parameters(addition)),
             folded("notes", "Notes", bullets(addition.notes)),
             repeat(command, commands, "addition", addition.to_json()),
@@ -55,7 +59,7 @@ def addition_sections(
 def addition_sentence(addition: Addition) -> str:
     """The added effect with its values, and the change of the held-out errors."""
     term, values = addition.added
-    text = ", ".join(part for part in (meaning(term.effect.id), _values(values)) if part)
+    text = ", ".join(part for part in (meaning(term.effect.id), values_text(values)) if part)
     named = f"Added {term.label} to the profile{f': {text}' if text else ''}."
     outputs = addition.outputs
     gain = gain_text(outputs, "With it")
@@ -81,11 +85,6 @@ def _lead(
     ]
     head = capital(meaning(term.effect.id)) or f"Added: {term.label}"
     return lead(title, chip, tone, head, rows, *beside)
-
-
-def _added(addition: Addition) -> Markup:
-    term, values = addition.added
-    return tables.named([(term.effect, term.label, values)])
 
 
 def _chip(outputs: Mapping[str, OutputFit]) -> tuple[str, str]:
@@ -132,14 +131,10 @@ def _parameters(addition: Addition) -> Markup:
             element("code", term.label),
             "added" if at == last else "refitted",
             meaning(term.effect.id) or term.effect.what,
-            _values(values),
+            values_text(values),
         ]
         for at, (term, values) in enumerate(addition.terms)
     ]
     head = ["effect", "status", "meaning", "values"]
     caption = "All values are fitted together, ± one standard deviation."
     return table(caption, head, rows, words=4)
-
-
-def _values(values: Mapping[str, Estimate]) -> str:
-    return values_text(values)

@@ -10,7 +10,7 @@ import numpy as np
 
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
-from winchkit.report.html.markup import Markup, element, folded, join, section, table
+from winchkit.report.html.markup import Markup, element, facts, folded, join, section, table
 from winchkit.report.html.page import figure_block, page
 
 if TYPE_CHECKING:
@@ -163,8 +163,7 @@ def _about(calibration: CellCalibration) -> Markup:
         ("direction", calibration.direction),
         ("temperature", "not given" if warm is None else f"{warm:g} °C"),
     ]
-    pairs = [part for name, said in rows for part in (element("dt", name), element("dd", said))]
-    return element("dl", *pairs, class_="facts")
+    return facts(rows)
 
 
 def _points(points: Sequence[CalibrationPoint], fit: CellFit, unit: str) -> Markup:
@@ -207,9 +206,10 @@ def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
                 f"residual, {name}", tone, load[own], residual[own] / size.worth, "points", name
             )
         )
+    file = "".join(c if c.isascii() and c.isalnum() else "-" for c in calibration.name)
     return [
         Figure(
-            f"calibration-{_file_name(calibration.name)}",
+            f"calibration-{file or 'cell'}",
             "Force over the load",
             "Indicated and fitted force, and the true less the fitted force; a difference of up "
             "and down is hysteresis.",
@@ -221,8 +221,3 @@ def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
             source=f"calibration of {calibration.name}, {calibration.date.isoformat()}",
         )
     ]
-
-
-def _file_name(name: str) -> str:
-    """A name as a part of a file's name."""
-    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name) or "cell"

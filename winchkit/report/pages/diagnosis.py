@@ -14,7 +14,7 @@ from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.waterfall import errors_without, waterfall_of
-from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.html.markup import Markup, element, facts, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import CommandLine, repeat
@@ -184,8 +184,7 @@ def _next(diagnosis: Diagnosis) -> Markup:
 def _truth(truth: Mapping[str, object] | None) -> Markup:
     if not truth:
         return Markup("")
-    pairs = [(element("dt", str(k)), element("dd", str(v))) for k, v in truth.items()]
-    return element("dl", *(part for pair in pairs for part in pair), class_="facts")
+    return facts((str(name), str(value)) for name, value in truth.items())
 
 
 def _commands(diagnosis: Diagnosis, command: CommandLine) -> list[str]:

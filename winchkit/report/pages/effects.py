@@ -13,7 +13,7 @@ from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
 from winchkit.quantity_text import plain, scale_for
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import decimated
-from winchkit.report.html.markup import Markup, element, formula, section, table
+from winchkit.report.html.markup import Markup, element, facts, formula, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, parameter_name
@@ -65,15 +65,12 @@ def _card(effect: Effect, drawing: Sequence[Markup]) -> Markup:
         ("distinguished by", effect.told_apart),
         ("in control", in_control(effect)),
     ]
-    facts = [
-        part for name, text in pairs if text for part in (element("dt", name), element("dd", text))
-    ]
     return section(
         effect.id,
         capital(meaning(effect.id)) or effect.id,
         element("p", element("code", effect.id)),
         element("p", effect.what),
-        element("dl", *facts, class_="facts"),
+        facts(pairs),
         _parameters(effect),
         *drawing,
     )

@@ -9,6 +9,7 @@ from winchkit.diagnosis.add import FittedAddition, FittedWinchAddition
 from winchkit.diagnosis.compare import Compared, WinchCompared
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
+from winchkit.diagnosis.results import OutputError, OutputFit
 from winchkit.profile_edit.naming import extended_name
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import error_ladder, present
@@ -43,12 +44,7 @@ def report_html(
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
     laws = open_law_figures(answer, command.source)
-    ladder = error_ladder(
-        answer.diagnosis.outputs,
-        extended=residuals.after is not None,
-        changed=residuals.changed,
-        source=command.source,
-    )
+    ladder = _ladder(answer.diagnosis.outputs, residuals)
     content = sections(
         answer,
         cards,
@@ -71,12 +67,7 @@ def report_figures(answer: Answer, source: str = "") -> list[Figure]:
     assert isinstance(answer, WinchAnswer), "of a winch"
     residuals = residuals_of(answer, source)
     drawn, _ = _cards(residuals, {})
-    ladder = error_ladder(
-        answer.diagnosis.outputs,
-        extended=residuals.after is not None,
-        changed=residuals.changed,
-        source=source,
-    )
+    ladder = _ladder(answer.diagnosis.outputs, residuals)
     laws = open_law_figures(answer, source)
     return [*present(ladder), *drawn, *laws, *unexplained_figures(answer, source)]
 
@@ -136,7 +127,7 @@ def comparison_html(
     own = residual_figures(residuals)
     drawn, cards = _cards(residuals, size_texts(compared.comparison.outputs), own)
     over = {one.output: one.followed for one in own if one.followed}
-    ladder = error_ladder(compared.comparison.outputs, source=command.source)
+    ladder = _ladder(compared.comparison.outputs, residuals)
     content = comparison_sections(
         compared.comparison, over, cards, command, title=title, ladder=ladder
     )
@@ -148,8 +139,9 @@ def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
     if (by_wing := wings.call("figures", compared)) is not None:
         return list(by_wing(compared, source))
     assert isinstance(compared, WinchCompared), "of a winch"
-    ladder = error_ladder(compared.comparison.outputs, source=source)
-    return [*present(ladder), *_cards(residuals_of_comparison(compared, source), {})[0]]
+    residuals = residuals_of_comparison(compared, source)
+    ladder = _ladder(compared.comparison.outputs, residuals)
+    return [*present(ladder), *_cards(residuals, {})[0]]
 
 
 def addition_html(
@@ -167,7 +159,7 @@ def addition_html(
     command = CommandLine(fitted.regression.dataset, profile, options)
     outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))
-    ladder = error_ladder(outputs, extended=True, changed=residuals.changed, source=command.source)
+    ladder = _ladder(outputs, residuals)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
     content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
     html = page(title, [*present(ladder), *drawn], content, headed=False)
@@ -180,10 +172,20 @@ def addition_figures(fitted: FittedAddition, source: str = "") -> list[Figure]:
         return list(by_wing(fitted, source))
     assert isinstance(fitted, FittedWinchAddition), "of a winch"
     residuals = residuals_of_addition(fitted, source)
-    ladder = error_ladder(
-        fitted.addition.outputs, extended=True, changed=residuals.changed, source=source
-    )
+    ladder = _ladder(fitted.addition.outputs, residuals)
     return [*present(ladder), *_cards(residuals, {})[0]]
+
+
+def _ladder(
+    outputs: Mapping[str, OutputError] | Mapping[str, OutputFit], residuals: Residuals
+) -> Figure | None:
+    """Error of every output over its noise, with the changed model where there is one."""
+    return error_ladder(
+        outputs,
+        extended=residuals.after is not None,
+        changed=residuals.changed,
+        source=residuals.source,
+    )
 
 
 def _cards(

@@ -10,7 +10,7 @@ from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.quantity_text import unbroken
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.residuals import OutputFigures, run_names
-from winchkit.report.html.markup import Markup, details, element
+from winchkit.report.html.markup import Markup, details, element, facts
 from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.sentence import capital
@@ -53,15 +53,9 @@ def lead(
         element("h1", unbroken(headline)),
         class_="lead",
     )
-    steps = [
-        part
-        for question, answer in rows
-        if answer
-        for part in (element("dt", question), element("dd", unbroken_words(answer)))
-    ]
     brief = element(
         "div",
-        element("dl", *steps, class_="steps"),
+        facts(((question, _unbroken_words(answer)) for question, answer in rows), "steps"),
         *([element("div", *beside)] if any(beside) else []),
         class_="card brief" if any(beside) else "card",
         id="summary",
@@ -77,7 +71,7 @@ def lead(
     )
 
 
-def unbroken_words(text: str) -> str:
+def _unbroken_words(text: str) -> str:
     """Text with no-break spaces between numbers and units; markup as it is."""
     return text if isinstance(text, Markup) else unbroken(text)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from textwrap import wrap
 
 from winchkit.quantity_text import unbroken
@@ -38,6 +38,16 @@ def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
         for head, row in zip(heads, rows, strict=True)
         for line in paragraph(row[-1], head.ljust(width), " " * width)
     ]
+
+
+def entries(texts: Iterable[str]) -> list[str]:
+    """Texts in lines of at most 80 characters, indented by two, and by four from the second on."""
+    return [line for text in texts for line in paragraph(text, "  ", "    ")]
+
+
+def joined(blocks: Iterable[Sequence[str]]) -> str:
+    """Blocks of lines with an empty line between them; empty blocks are left out."""
+    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:

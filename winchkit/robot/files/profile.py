@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from winchkit.errors import FileError
 from winchkit.model.rotation import angles_of
 from winchkit.robot.geometry.kinematics import home_of
 from winchkit.robot.geometry.tracker import declared_tracker, pose_behind
 from winchkit.schema.profiles.robot import HomeSpec, RobotProfile
-from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import FileReading
@@ -49,23 +47,12 @@ def _line(reading: FileReading, raw: object, at: Key) -> object:
     if isinstance(winch, dict):
         profile = reading.winch(winch, str(raw.get("name", "")), place)
     elif isinstance(winch, str):
-        profile = _named_winch(reading, winch, place)
+        profile = reading.declared("profiles", winch, place, read_winch)
     else:
         profile = None
         reading.fault(place, f"expected the name of a winch or its tables, not {winch!r}")
     # The faults of a winch are noted above and not reported a second time.
     return {**raw, "winch": profile or str(winch)}
-
-
-def _named_winch(reading: FileReading, name: str, at: Key) -> WinchProfile | None:
-    path = reading.shipped("profiles", name, at)
-    if path is None:
-        return None
-    try:
-        return read_winch(path)
-    except FileError as error:
-        reading.faults += error.faults
-        return None
 
 
 def programme(reading: FileReading, tree: dict[str, Any]) -> RobotProgramme | None:

@@ -116,13 +116,13 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
     if first is None:
         faults.append(Fault("there is no header line; it names the columns, 'time [s],…'", name))
     is_own = above[:1] == [f"{CSV_MARK}\n"]
-    if is_own and first is not None and not _is_ended(first):
+    if is_own and first is not None and not first.endswith("\n"):
         faults.append(Fault("was cut off within its header; there is no row to recover", name))
     refuse(faults)
     number = len(above) + 1
     header = _header(name, first or "", number)
-    table, notes = _Table(name, header), _Notes(name, is_own=is_own)
-    whole, width = notes.whole(lines, len(header)), len(header)
+    table, width, notes = _Table(name, header), len(header), list[str]()
+    whole = _whole(name, lines, width, notes, is_own=is_own)
     numbers_of = _parser(Path(path))
     while block := list(islice(whole, _BLOCK)):
         if is_own:
@@ -145,7 +145,7 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
             metadata,
             metadata_lines,
             len(above) + 1,
-            notes.notes,
+            notes,
             faults + table.faults,
             is_part,
         )
@@ -177,35 +177,26 @@ def read_events(path: str | Path) -> tuple[Note, ...]:
     return tuple(events)
 
 
-class _Notes:
-    """Treatment of a last line without a line feed."""
-
-    def __init__(self, path: str, *, is_own: bool) -> None:
-        self.notes: list[str] = []
-        self._path, self._is_own = path, is_own
-
-    def whole(self, lines: Iterator[str], width: int) -> Iterator[str]:
-        """The complete lines; the note on an incomplete last one is in ``notes``."""
-        for line in lines:
-            if not line.endswith("\n") and line.strip():
-                if self._is_own:
-                    self.notes.append(cut_off(self._path, "rows before its last line"))
-                    return
-                if (cells := _width(line)) < width:
-                    self.notes.append(
-                        f"the last line has {cells} cells of {width} and no line end; it is left "
-                        "out: is the file cut off?"
-                    )
-                    return
-                self.notes.append(
-                    "the last row has no line end; if the file was cut off there, its last number "
-                    "may lack digits"
+def _whole(
+    path: str, lines: Iterator[str], width: int, notes: list[str], *, is_own: bool
+) -> Iterator[str]:
+    """The complete lines; of a last one without a line feed a note is added."""
+    for line in lines:
+        if not line.endswith("\n") and line.strip():
+            if is_own:
+                notes.append(cut_off(path, "rows before its last line"))
+                return
+            if (cells := _width(line)) < width:
+                notes.append(
+                    f"the last line has {cells} cells of {width} and no line end; it is left out: "
+                    "is the file cut off?"
                 )
-            yield line
-
-
-def _is_ended(line: str) -> bool:
-    return line.endswith("\n")
+                return
+            notes.append(
+                "the last row has no line end; if the file was cut off there, its last number may "
+                "lack digits"
+            )
+        yield line
 
 
 def _width(line: str) -> int:
@@ -292,14 +283,10 @@ class _Table:
 
 def _is_comment_kept(line: str, above: list[str]) -> bool:
     """Whether a line is above the header; such lines are kept."""
-    if not _is_comment(line):
+    if line.strip() and not line.lstrip().startswith("#"):
         return False
     above.append(line)
     return True
-
-
-def _is_comment(line: str) -> bool:
-    return not line.strip() or line.lstrip().startswith("#")
 
 
 def _metadata(

@@ -180,7 +180,7 @@ def _run(name: str, content: McapContent) -> Run:
     values = _values(name, list(columns), rows)
     metadata = content.metadata.get(METADATA, {})
     header = list(columns.items())
-    return assemble(RawColumns(name, header, list(values), lambda _: None, metadata, notes=notes))
+    return assemble(RawColumns(name, header, list(values), metadata=metadata, notes=notes))
 
 
 def _values(path: str, names: list[str], rows: list[bytes]) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -11,19 +12,12 @@ from winchkit.arrays import Array
 from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, clock_before
 from winchkit.runs.importing.unit_spelling import COUNTS, SpelledUnit
 from winchkit.schema.linear_axis import rotary_name
 
 _MEASURED = {"actual", "act", "ist", "measured", "meas"}
-_PREFERRED = {
-    *_MEASURED,
-    "motor",
-    "mot",
-    "feedback",
-    "fb",
-    "estimate",
-}
+_PREFERRED = {*_MEASURED, "motor", "mot", "feedback", "fb", "estimate"}
 _AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
 Confidence = Literal["given", "named", "derived", "assumed", "unused"]
 """``given`` by the user or a mapping, ``named`` by name and unit in the file, ``derived`` from the
@@ -128,6 +122,10 @@ class Choice:
     questions: list[Question] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
+    def leave(self, items: Iterable[ChannelCandidate], reason: str) -> None:
+        """Note that columns are not used, and why."""
+        self.unused += [replace(item, channel="", reason=reason) for item in items]
+
 
 @dataclass(eq=False)
 class ChosenColumn:
@@ -187,10 +185,10 @@ class Work:
 
 
 def clock_of(work: Work, item: ChosenColumn) -> ChosenColumn | None:
-    """The time column of a column: the last one before it in its group, else the first."""
-    clocks = [c for c in work.columns if c.base == "time" and c.column.group == item.column.group]
-    before = [c for c in clocks if c.column.number < item.column.number]
-    return before[-1] if before else clocks[0] if clocks else None
+    """The time column of a column."""
+    clocks = {id(c.column): c for c in work.columns if c.base == "time"}
+    found = clock_before([c.column for c in clocks.values()], item.column)
+    return None if found is None else clocks[id(found)]
 
 
 def clock_values(clock: ChosenColumn) -> Array:
@@ -205,11 +203,9 @@ def is_counted(item: ChosenColumn) -> bool:
     unit = item.candidate.unit
     if unit is not None:
         return unit.dimension == COUNTS
-    values = item.column.values[np.isfinite(item.column.values)]
-    return is_whole(item) and float(np.ptp(values)) > 300
+    return is_whole(item) and float(np.ptp(item.column.known)) > 300
 
 
 def is_whole(item: ChosenColumn) -> bool:
     """Whether a column without a unit has whole numbers only, as counts are."""
-    values = item.column.values[np.isfinite(item.column.values)]
-    return item.candidate.unit is None and bool(np.all(values == np.round(values)))
+    return item.candidate.unit is None and are_whole(item.column.known)

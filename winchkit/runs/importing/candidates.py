@@ -24,7 +24,7 @@ from winchkit.runs.importing.orientation import (
     vector_names,
 )
 from winchkit.runs.importing.source_stamps import SOURCE_STAMP
-from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNT_RATE,
@@ -110,7 +110,7 @@ def choose(
         even = _even_clock(choice)
         if even:
             free = [item for item in free if item not in times]
-            choice.unused += [replace(i, channel="", reason="number of the row") for i in times]
+            choice.leave(times, "number of the row")
         times = even or times
     poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
     if not any(item.channel == QUATERNION[0] for item in poses):
@@ -158,7 +158,7 @@ def _left_after(
 ) -> list[ChannelCandidate]:
     for item in free:
         if item.channel in taken:
-            choice.unused.append(replace(item, channel="", reason=f"{item.channel} {words}"))
+            choice.leave([item], f"{item.channel} {words}")
     return [item for item in free if item.channel not in taken]
 
 
@@ -226,8 +226,7 @@ def _by_name(
 
 def _current_unit(column: FileColumn) -> SpelledUnit | None:
     """A for a current without a unit; of an unknown size where the numbers are whole."""
-    values = column.values[np.isfinite(column.values)]
-    is_whole = bool(np.all(values == np.round(values)))
+    is_whole = are_whole(column.known)
     return SpelledUnit("", "current", math.nan) if is_whole else read_unit("A")
 
 
@@ -256,7 +255,7 @@ def _is_clock(column: FileColumn, *, steady: bool = False) -> bool:
 
     A ``steady`` clock increases from row to row in most rows.
     """
-    steps = np.diff(column.values[np.isfinite(column.values)])
+    steps = np.diff(column.known)
     if not len(steps):
         return False
     increases = float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
@@ -286,8 +285,10 @@ def _increases_evenly(item: ChannelCandidate) -> bool:
         return False
     if not item.reason.startswith(_UNKNOWN) or not np.all(np.isfinite(values)):
         return False
-    steps, whole = np.diff(values), bool(np.all(values == np.round(values)))
-    return not whole and bool(np.all(steps > 0) and np.ptp(steps) < _UNEVEN * np.median(steps))
+    steps = np.diff(values)
+    return not are_whole(values) and bool(
+        np.all(steps > 0) and np.ptp(steps) < _UNEVEN * np.median(steps)
+    )
 
 
 def _choose_times(table: ColumnTable, times: Sequence[ChannelCandidate], choice: Choice) -> None:
@@ -297,23 +298,17 @@ def _choose_times(table: ColumnTable, times: Sequence[ChannelCandidate], choice:
     for group in dict.fromkeys(item.column.group for item in clocks):
         own = [item for item in clocks if item.column.group == group]
         best = min(item.rank for item in own)
-        for item in own:
-            if item.rank > best:
-                choice.unused.append(replace(item, channel="", reason="another column is time"))
+        choice.leave((item for item in own if item.rank > best), "another column is time")
         own = [item for item in own if item.rank == best]
         for block in _blocks(table, own):
             kept = max(block, key=_quality)
             choice.chosen.append(kept)
-            choice.unused += [
-                replace(item, channel="", reason="another column is time")
-                for item in block
-                if item is not kept
-            ]
+            choice.leave((item for item in block if item is not kept), "another column is time")
             day = next((d for d in dates if d.column.group == group), None)
             if day is not None and _needs_date(kept):
                 choice.chosen.append(day)
                 dates.remove(day)
-    choice.unused += [replace(item, channel="", reason="date without use") for item in dates]
+    choice.leave(dates, "date without use")
 
 
 def _blocks(table: ColumnTable, clocks: Sequence[ChannelCandidate]) -> list[list[ChannelCandidate]]:
@@ -374,7 +369,7 @@ def _choose_pose(poses: list[ChannelCandidate], body: str | None, choice: Choice
         wanted = f"no body '{body}'" if body is not None else "which body is the platform?"
         options = tuple(f'--body "{name}"' for name in bodies)
         choice.questions.append(Question(f"{wanted} The file has {', '.join(bodies)}", options))
-        choice.unused += [replace(i, channel="", reason="one of several bodies") for i in poses]
+        choice.leave(poses, "one of several bodies")
         return
     own = {item.channel: item for item in given}
     for item in poses:
@@ -387,4 +382,4 @@ def _choose_pose(poses: list[ChannelCandidate], body: str | None, choice: Choice
         else:
             is_own = body_of(item.column) == chosen
             reason = "not a complete pose" if is_own else f"of another body than '{chosen}'"
-            choice.unused.append(replace(item, channel="", reason=reason))
+            choice.leave([item], reason)

@@ -120,8 +120,8 @@ def beyond_rating(work: Work) -> None:
     """Notes on torques that no motor of the rated torque has."""
     rated = work.answers.rated_torque
     for item in [item for item in work.columns if item.base == "motor_torque" and item.factor]:
-        values = item.column.values[np.isfinite(item.column.values)]
-        times = float(np.max(np.abs(values), initial=0.0)) * abs(item.factor or 0) / (rated or 1)
+        largest = float(np.max(np.abs(item.column.known), initial=0.0))
+        times = largest * abs(item.factor or 0) / (rated or 1)
         if rated and times > _OVERLOAD:
             work.notes.append(
                 f"'{item.column.source}' reaches {times:.3g} times the rated torque of {rated:g} "

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, named_apart
 
 _MARKERS = frozenset(("marker id", "marker", "tag id", "tag", "aruco id", "fiducial id"))
 """Titles of a column that names the marker whose pose a row has."""
@@ -131,8 +131,8 @@ def _names(column: FileColumn) -> NDArray[np.str_] | None:
     """Axis of each row, empty where it has none; None for numbers that name nothing."""
     if column.texts is not None:
         return np.array([text.strip() for text in column.texts], dtype=np.str_)
-    known = column.values[np.isfinite(column.values)]
-    if np.any(known < 0) or np.any(known != np.round(known)):
+    known = column.known
+    if np.any(known < 0) or not are_whole(known):
         return None
     found = np.unique(known)
     if len(found) > _MOST:

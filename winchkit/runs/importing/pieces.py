@@ -133,11 +133,7 @@ def pieces_of(streams: Streams, jumps: tuple[Jump, ...]) -> tuple[Streams, ...]:
     edges = [-np.inf, *((jump.time + jump.until) / 2 for jump in jumps), np.inf]
     pieces = []
     for start, end in pairwise(edges):
-        parts = []
-        for stream in streams.streams:
-            kept = (stream.time > start) & (stream.time < end)
-            channels = {name: values[kept] for name, values in stream.channels.items()}
-            parts.append(Stream(stream.time[kept], channels, stream.rows[kept]))
+        parts = [s.at((s.time > start) & (s.time < end)) for s in streams.streams]
         if min(len(part.time) for part in parts) >= _FEWEST:
             pieces.append(replace(streams, streams=tuple(parts)))
     if not pieces:

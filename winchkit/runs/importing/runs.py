@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice
@@ -12,7 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.assemble import RawColumns, assemble, refuse
+from winchkit.runs.assemble import RawColumns, assemble, order_faults, refuse
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
@@ -191,17 +191,13 @@ def _coarse_clock(time: Array) -> str:
     )
 
 
-def _time_faults(streams: Streams, stream: Stream) -> Sequence[Fault]:
+def _time_faults(streams: Streams, stream: Stream) -> Iterator[Fault]:
     """Stamps that are missing or do not increase, as the file has them."""
-    origin = 0.0 if streams.is_absolute else streams.origin
-    faults = []
+
+    def line_of(row: int) -> int | None:
+        return streams.line_of(int(stream.rows[row]))
+
     for row in np.flatnonzero(~np.isfinite(stream.time)):
-        line = streams.line_of(int(stream.rows[row]))
-        faults.append(Fault("time is missing here", streams.path, line))
-    for row in np.flatnonzero(stream.time[1:] <= stream.time[:-1]) + 1:
-        earlier, later = origin + stream.time[row - 1], origin + stream.time[row]
-        word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
-        message = f"time {word} {later:.9g} s; rows must come in order of time, each once"
-        line = streams.line_of(int(stream.rows[row]))
-        faults.append(Fault(message, streams.path, line))
-    return faults
+        yield Fault("time is missing here", streams.path, line_of(int(row)))
+    origin = 0.0 if streams.is_absolute else streams.origin
+    yield from order_faults(streams.path, stream.time, line_of, origin)

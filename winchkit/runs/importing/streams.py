@@ -21,7 +21,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.orientation import rotation_as
 from winchkit.runs.importing.stored.numbers import range_of, restored
-from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.table import ColumnTable, FileColumn, clock_before
 from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP
 
 _PADDED = 0.67
@@ -46,6 +46,11 @@ class Stream:
     """Values in SI by channel, shape (n,)."""
     rows: NDArray[np.intp]
     """Row of the table, shape (n,)."""
+
+    def at(self, samples: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Stream:
+        """The same channels at some of the samples, by a mask or in an order."""
+        channels = {name: values[samples] for name, values in self.channels.items()}
+        return Stream(self.time[samples], channels, self.rows[samples])
 
     @property
     def interval(self) -> float:
@@ -100,7 +105,7 @@ def streams_of(guess: Guess) -> Streams:
         item = used[source]
         if item.channel in {"time", DATE}:
             continue
-        clock = _clock_of(clocks, column)
+        clock = clock_before(clocks, column)
         key = clock.source if clock is not None else f"\0{len(column)}"
         blocks.setdefault(key, {})[item.channel] = column.values
     assigned = {item.channel: item for item in guess.used}
@@ -224,19 +229,13 @@ def _clock(
         values, absolute = (column.values - _EXCEL_EPOCH) * 86_400.0, True
     else:
         absolute = epoch_unit(column.values) == item.unit
-        known = column.values[np.isfinite(column.values)]
+        known = column.known
         raw = float(known[0]) if len(known) else 0.0
         # The difference first: nanoseconds since 1970 have no digits left for its fraction.
         return raw * item.factor + item.offset, (column.values - raw) * item.factor, absolute
     known = values[np.isfinite(values)]
     first = float(known[0]) if len(known) else 0.0
     return first, values - first, absolute
-
-
-def _clock_of(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn | None:
-    own = [item for item in clocks if item.group == column.group]
-    before = [item for item in own if item.number < column.number]
-    return before[-1] if before else own[0] if own else None
 
 
 def _with_quaternion(
@@ -263,10 +262,8 @@ def _quaternion(matrix: Array) -> dict[str, Array]:
 def _forward(stream: Stream) -> Stream:
     """The latest row last, in a file that has it first."""
     steps = np.diff(stream.time)
-    if not len(steps) or not np.all(steps < 0):
-        return stream
-    channels = {name: values[::-1] for name, values in stream.channels.items()}
-    return Stream(stream.time[::-1], channels, stream.rows[::-1])
+    is_backward = len(steps) > 0 and bool(np.all(steps < 0))
+    return stream.at(slice(None, None, -1)) if is_backward else stream
 
 
 def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
@@ -279,7 +276,7 @@ def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Str
     where = f" (line {', '.join(map(str, lines))})" if lines else ""
     count = f"{len(wrong)} of {len(stream.time)} rows"
     note = f"{count}{where} have a time that is out of order and are left out"
-    return _rows_of(stream, kept), [note]
+    return stream.at(kept), [note]
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
@@ -295,7 +292,8 @@ def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
     notes = []
     if count := int(np.count_nonzero(same & ~empty)):
         notes.append(f"{count} rows that repeat the row before them are left out")
-    found = _rows_of(stream, ~(same | empty))
+    left_out = same | empty
+    found = stream.at(~left_out) if left_out.any() else stream
     still = np.zeros(len(found.time), dtype=bool)
     still[1:] = np.diff(found.time) == 0
     count = int(np.count_nonzero(still))
@@ -303,15 +301,8 @@ def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
         notes.append(
             f"{count} of {len(still)} rows have the stamp of the row before them and are left out"
         )
-        return _rows_of(found, ~still), notes
+        return found.at(~still), notes
     return found, notes
-
-
-def _rows_of(stream: Stream, kept: NDArray[np.bool_]) -> Stream:
-    if kept.all():
-        return stream
-    channels = {name: values[kept] for name, values in stream.channels.items()}
-    return Stream(stream.time[kept], channels, stream.rows[kept])
 
 
 def _by_rate(stream: Stream) -> list[Stream]:
@@ -328,7 +319,7 @@ def _by_rate(stream: Stream) -> list[Stream]:
     streams = []
     for names in found.values():
         only = replace(stream, channels={name: stream.channels[name] for name in names})
-        streams.append(_rows_of(only, np.any([known[name] for name in names], axis=0)))
+        streams.append(only.at(np.any([known[name] for name in names], axis=0)))
     return streams
 
 

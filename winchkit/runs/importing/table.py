@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError
+from winchkit.errors import Fault, RunError, WinchkitError
 
 LARGEST = 1 << 30
 """Largest size of a file, of its unpacked content and of its numbers, bytes."""
@@ -41,6 +42,11 @@ class FileColumn:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    @property
+    def known(self) -> Array:
+        """The values that are not missing, (m,)."""
+        return self.values[np.isfinite(self.values)]
 
     def at(self, rows: NDArray[np.intp]) -> FileColumn:
         """The same column at some of its rows, shape (m,)."""
@@ -81,6 +87,13 @@ class ColumnTable:
         return found
 
 
+def clock_before(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn | None:
+    """The time column of a column: the last one before it in its group, else the first."""
+    own = [item for item in clocks if item.group == column.group]
+    before = [item for item in own if item.number < column.number]
+    return before[-1] if before else own[0] if own else None
+
+
 def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
     """Columns with numbers and unique names in ``source``.
 
@@ -99,6 +112,22 @@ def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
         source = name if seen[name] == 1 else f"{name} #{seen[name]}"
         found.append(replace(item, number=number, source=source))
     return tuple(found)
+
+
+def are_whole(values: Array) -> bool:
+    """Whether finite numbers, (n,), are whole; true without any."""
+    return bool(np.all(values == np.round(values)))
+
+
+@contextmanager
+def readable(path: str, kind: str) -> Iterator[None]:
+    """Convert what a library raises for a damaged file of a kind to RunError."""
+    try:
+        yield
+    except WinchkitError:
+        raise
+    except Exception as error:  # noqa: BLE001 - libraries raise many kinds, even of their own bugs
+        raise RunError(Fault(f"is not a readable {kind}: {error}", path)) from None
 
 
 def refuse_size(path: str, size: int, what: str) -> None:

@@ -21,7 +21,7 @@ from winchkit.runs.importing.assignment import (
 from winchkit.runs.importing.consistency import CLOCKS
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import ColumnTable
+from winchkit.runs.importing.table import ColumnTable, are_whole
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNT_RATE,
@@ -109,7 +109,7 @@ def _settle_clock(
     elif epoch is not None:
         item.settle(CLOCKS[epoch], epoch, "named", f"{epoch} since 1970")
     else:
-        steps = np.diff(item.column.values[np.isfinite(item.column.values)])
+        steps = np.diff(item.column.known)
         usual = float(np.median(steps)) if len(steps) else math.nan
         declared = work.table.interval
         matching = [
@@ -213,7 +213,7 @@ def by_convention(work: Work) -> None:
         if declared is not None:
             item.settle(declared.factor, declared.text, "named", "unit of the whole file")
         elif item.base == "time":
-            if _is_in_seconds(item.column.values):
+            if _is_in_seconds(item.column.known):
                 item.settle(1.0, "s", "assumed", "steps below 1, not whole numbers")
         elif item.base == "temperature":
             item.settle(1.0, "degC", "assumed", "temperatures are in degC")
@@ -237,20 +237,19 @@ def _doubt(work: Work, item: ChosenColumn) -> str:
     if item.base != "motor_angle" or _is_of_ros(work.table):
         return ""
     return _doubt_of_radians(
-        item.column.values,
+        item.column.known,
         is_array=work.table.layout in _SI_LAYOUTS,
         is_one_of_several=sum(other.base == "motor_angle" for other in work.columns) > 1,
     )
 
 
-def _doubt_of_radians(values: Array, *, is_array: bool, is_one_of_several: bool) -> str:
+def _doubt_of_radians(known: Array, *, is_array: bool, is_one_of_several: bool) -> str:
     """Why values that are rad by convention may be degrees; empty where they are rad.
 
     The names of robotics (``q1``, ``theta``) and the formats of arrays stand for rad. Degrees of a
     joint and radians of a motor that turns have the same range, beyond 2π and within 720; no
     column but a velocity with a unit distinguishes them.
     """
-    known = values[np.isfinite(values)]
     largest = float(np.max(np.abs(known), initial=0.0))
     if not _LARGEST_OF_JOINT < largest <= _LARGEST_IN_DEGREES:
         return ""
@@ -299,7 +298,5 @@ def _is_of_ros(table: ColumnTable) -> bool:
 
 
 def _is_in_seconds(values: Array) -> bool:
-    finite = values[np.isfinite(values)]
-    steps = np.diff(finite)
-    is_whole = bool(np.all(finite == np.round(finite)))
-    return len(steps) > 0 and not is_whole and float(np.median(steps)) < 1.0
+    steps = np.diff(values)
+    return len(steps) > 0 and not are_whole(values) and float(np.median(steps)) < 1.0

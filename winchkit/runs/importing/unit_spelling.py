@@ -171,8 +171,7 @@ def read_unit(text: str) -> SpelledUnit | None:
 
 def _inner(text: str) -> str:
     stripped = text.strip()
-    pairs = {"[": "]", "(": ")", "{": "}", "<": ">"}
-    if len(stripped) > 1 and pairs.get(stripped[0]) == stripped[-1]:
+    if len(stripped) > 1 and (_PAIRS | {"<": ">"}).get(stripped[0]) == stripped[-1]:
         return stripped[1:-1].strip()
     return stripped
 
@@ -240,26 +239,9 @@ def _brackets(text: str) -> list[tuple[int, int, str]]:
     return found
 
 
-_SHORT_WORDS = {
-    "in",
-    "a",
-    "p",
-    "t",
-    "c",
-    "k",
-    "f",
-    "h",
-    "d",
-    "g",
-    "u",
-    "r",
-    "ct",
-    "tr",
-    "rot",
-    "''",
-}
-
-
+_SHORT_WORDS = frozenset(
+    ["in", "a", "p", "t", "c", "k", "f", "h", "d", "g", "u", "r", "ct", "tr", "rot", "''"]
+)
 _PLAIN_WORDS = {"count", "counts", "steps", "rotation", "rotations", "cycles", "pulses", "tour"}
 """Words of names that are also units."""
 

@@ -53,7 +53,7 @@ def choose_channels(
         elif none.intersection(stem_of(item.column, channel) for item in items):
             reason = "has no column, by --column"
         if reason:
-            choice.unused += [replace(item, channel="", reason=reason) for item in items]
+            choice.leave(items, reason)
             continue
         items.sort(key=lambda item: item.order)
         best = [item for item in items if item.order == items[0].order]
@@ -77,14 +77,10 @@ def choose_channels(
                         tuple(f'--column "{channel}={name}"' for name in (*names, "")),
                     )
                 )
-            reason = f"one of several: --column {channel}=…"
-            choice.unused += [replace(item, channel="", reason=reason) for item in items]
+            choice.leave(items, f"one of several: --column {channel}=…")
             continue
         choice.chosen.append(replace(items[0], channel=channel))
-        choice.unused += [
-            replace(item, channel="", reason=f"'{items[0].column.source}' is {channel}")
-            for item in items[1:]
-        ]
+        choice.leave(items[1:], f"'{items[0].column.source}' is {channel}")
 
 
 def stem_of(column: FileColumn, channel: str) -> tuple[str, ...]:
@@ -140,11 +136,11 @@ def _leave_constant(
             constant = [item for item in by_channel.get(name, ()) if _is_constant(item)]
             for item in constant:
                 by_channel[name].remove(item)
-                choice.unused.append(replace(item, channel="", reason="constant while it moves"))
+            choice.leave(constant, "constant while it moves")
 
 
 def _is_constant(item: ChannelCandidate) -> bool:
-    values = item.column.values[np.isfinite(item.column.values)]
+    values = item.column.known
     return len(values) >= FEWEST and bool(np.all(values == values[0]))
 
 

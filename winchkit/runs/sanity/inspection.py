@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
+from winchkit.runs.run import Run
 from winchkit.runs.sanity.consistency import velocity_consistency
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.ground import ground_mask, load_on_ground
@@ -18,6 +18,7 @@ from winchkit.runs.sanity.quantisation import quantised, resolutions
 from winchkit.runs.sanity.repeated_values import constant, repeated_values
 from winchkit.runs.sanity.sampling import sampling
 from winchkit.runs.sanity.saturation import saturated
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 
 _INSTRUMENTS = {"tension", "tension_gross", "load", "load_gross", "motor_torque", "cable_length"}
 """Channels that no trajectory generator sets, so that a limit is one of the instrument."""

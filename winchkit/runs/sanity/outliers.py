@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.quantity_text import quantity
-from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
+from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import sorted_quantile
 from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 
 _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
@@ -91,18 +92,24 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
 def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Finding]:
     """Spikes of the channels; value: largest deviation."""
     for name, spikes in masks.items():
-        values = run[name]
-        good = ~spikes & np.isfinite(values)
-        between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), values[good])
-        largest = float(np.max(np.abs(values[spikes] - between)))
+        largest = spike_size(run[name], spikes)
         yield Finding(
             "outliers",
             run.name,
             name,
             largest,
-            f"{np.count_nonzero(spikes)} of {len(values)} samples are spikes of up to "
+            f"{np.count_nonzero(spikes)} of {len(run)} samples are spikes of up to "
             f"{quantity(largest, run.channels[name].unit)}; they are not compared",
         )
+
+
+def spike_size(values: Array, spikes: NDArray[np.bool_]) -> float:
+    """Largest distance of the spikes from the line between the other samples; 0 without any."""
+    if not spikes.any():
+        return 0.0
+    good = ~spikes & np.isfinite(values)
+    between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), values[good])
+    return float(np.max(np.abs(values[spikes] - between)))
 
 
 def _spikes(

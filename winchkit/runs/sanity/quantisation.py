@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.quantity_text import quantity
-from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
+from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import local_noise, smallest_differences, sorted_quantile
 from winchkit.runs.sanity.sampling import with_lost_samples
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 
 _BINS = 8192
 """Bins of the histogram of the differences: with `_BINS_PER_STEP` it shows steps down to 1/512 of

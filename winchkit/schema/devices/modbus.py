@@ -120,8 +120,35 @@ class UnlockStep(Table):
     value: Annotated[int, Whole(0, 0xFFFF)]
 
 
-@dataclass(frozen=True)
-class CommandSpec(Table):
+@dataclass(frozen=True, kw_only=True)
+class VerifiedCommand(Table):
+    """A command of an instrument, whose execution its status shows."""
+
+    comes: StatusMeaning | None = None
+    """Status that is set when the command has been executed."""
+    goes: StatusMeaning | None = None
+    """Status that is cleared when the command has been executed."""
+    within: PositiveDuration = 1.0
+    """Longest time to that status, s."""
+    permanent: Flag = False
+    """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
+
+
+def unverified(
+    commands: Mapping[str, VerifiedCommand], bits: Mapping[StatusMeaning, tuple[int, ...]]
+) -> Iterator[Rule]:
+    """Commands that a status without a bit verifies."""
+    for name, command in commands.items():
+        for meaning in (command.comes, command.goes):
+            if meaning is not None and meaning not in bits:
+                yield (
+                    "command",
+                    f"'{name}' is verified by the status '{meaning}', which has no bit",
+                )
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommandSpec(VerifiedCommand):
     """A command (tare, zero): the value written to a register (wire address, from 0)."""
 
     register: int
@@ -132,14 +159,6 @@ class CommandSpec(Table):
     """Modbus function; two registers always take 16."""
     unlock: tuple[UnlockStep, ...] = ()
     """Written before it, with the same function."""
-    comes: StatusMeaning | None = None
-    """Status that is set when the command has been executed."""
-    goes: StatusMeaning | None = None
-    """Status that is cleared when the command has been executed."""
-    within: PositiveDuration = 1.0
-    """Longest time to that status, s."""
-    permanent: Flag = False
-    """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
 
     @property
     def writes_many(self) -> bool:
@@ -237,10 +256,4 @@ class ModbusSpec(Table):
                 yield "status_register", "missing; it is the register of the status bits"
         elif not self.holds(self.status_register, REGISTERS[self.status_type]):
             yield "status_register", f"{self.status_register} is in no block that is read"
-        for name, command in self.command.items():
-            for meaning in (command.comes, command.goes):
-                if meaning is not None and meaning not in self.status:
-                    yield (
-                        "command",
-                        f"'{name}' is verified by the status '{meaning}', which has no bit",
-                    )
+        yield from unverified(self.command, self.status)

@@ -6,35 +6,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from winchkit.schema.devices.modbus import StatusMeaning
+from winchkit.schema.devices.modbus import StatusMeaning, VerifiedCommand, unverified
 from winchkit.schema.devices.servo import PdoSpec
-from winchkit.schema.quantity import (
-    Duration,
-    Flag,
-    Number,
-    PositiveDuration,
-    PositiveNumber,
-    Whole,
-)
+from winchkit.schema.quantity import Duration, Number, PositiveNumber, Whole
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
 
-@dataclass(frozen=True)
-class ProcessCommand(Table):
+@dataclass(frozen=True, kw_only=True)
+class ProcessCommand(VerifiedCommand):
     """A command: the value written to an object."""
 
     object: str
     """As ``0x2104`` or ``0x2104:1``."""
     value: Annotated[int, Whole(0, 0xFFFFFFFF)]
-    comes: StatusMeaning | None = None
-    """Status that is set when the command has been executed."""
-    goes: StatusMeaning | None = None
-    """Status that is cleared when the command has been executed."""
-    within: PositiveDuration = 1.0
-    """Longest time to that status, s."""
-    permanent: Flag = False
-    """It writes the device's EEPROM: only ``winchkit cell store`` sends it."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +57,4 @@ class ProcessSpec(Table):
         wanted = {self.value} | ({self.status} if self.status else set())
         if self.tpdo and not any(wanted <= set(pdo.objects) for pdo in self.tpdo):
             yield "tpdo", f"none of them carries {' and '.join(sorted(wanted))}"
-        for name, command in self.command.items():
-            for meaning in (command.comes, command.goes):
-                if meaning is not None and meaning not in self.bits:
-                    yield (
-                        "command",
-                        f"'{name}' is verified by the status '{meaning}', which has no bit",
-                    )
+        yield from unverified(self.command, self.bits)

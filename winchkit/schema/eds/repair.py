@@ -100,6 +100,10 @@ class EdsFindings:
         """Note a repair."""
         self.warnings.append(Fault(message, self.path, line))
 
+    def mend(self, section: Section, key: str, message: str) -> None:
+        """Note the repair of a key, or of its section where the key is missing or empty."""
+        self.warn(section.line_of(key), f"[{section.name}] {message}")
+
 
 def canonical(name: str) -> str:
     """One spelling: ``6040``, ``1018sub1``, ``1003Name``, and ``DeviceInfo`` in any case."""
@@ -201,10 +205,11 @@ def _read_number(section: Section, key: str, text: str, findings: EdsFindings) -
     """As ``_number``, with a warning where a leading zero makes another number of it."""
     value, bare = _number(text), text.replace(" ", "")
     if value is not None and _ZEROS.match(bare) and value != int(bare):
-        findings.warn(
-            section.line_of(key),
-            f"[{section.name}] {key} {bare} begins with 0, so that it is octal by CiA 306: "
-            f"{value}; write {int(bare)} if that is meant",
+        findings.mend(
+            section,
+            key,
+            f"{key} {bare} begins with 0, so that it is octal by CiA 306: {value}; write "
+            f"{int(bare)} if that is meant",
         )
     return value
 
@@ -227,7 +232,7 @@ def _mend_device(sections: dict[str, Section], findings: EdsFindings) -> None:
         if text is None or _number(text) is not None:
             continue
         said = "is empty" if not text else f"{text!r} is not a number"
-        findings.warn(info.lines[key], f"[DeviceInfo] {key} {said}; taken as 0")
+        findings.mend(info, key, f"{key} {said}; taken as 0")
         info.values[key] = "0"
     _without_zeros(info, _NUMBERS, findings)
 
@@ -239,15 +244,13 @@ def _mend_dummies(sections: dict[str, Section], findings: EdsFindings) -> None:
     for number in range(1, 8):
         key = f"Dummy{number:04d}"
         if _number(dummies.values.get(key, "")) not in (0, 1):
-            findings.warn(
-                dummies.line_of(key), f"[DummyUsage] {key} is neither 0 nor 1; taken as 0"
-            )
+            findings.mend(dummies, key, f"{key} is neither 0 nor 1; taken as 0")
             dummies.values[key] = "0"
         _without_zeros(dummies, [key], findings)
 
 
 def _stand_in(index: int, member: Section, findings: EdsFindings) -> Section:
-    findings.warn(member.line, f"[{member.name}] has no [{index:04X}]; taken as part of a record")
+    findings.mend(member, "", f"has no [{index:04X}]; taken as part of a record")
     values = {"ParameterName": f"Object {index:04X}h", "ObjectType": hex(_RECORD)}
     return Section(f"{index:04X}", member.line, values)
 
@@ -271,9 +274,7 @@ def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Eds
     if kind in (_VAR, _DOMAIN):
         _mend_variable(section, findings)
         for member in members:
-            findings.warn(
-                member.line, f"[{member.name}] is left out: [{section.name}] is one value"
-            )
+            findings.mend(member, "", f"is left out: [{section.name}] is one value")
         subs.pop(index, None)
     elif "CompactSubObj" in section.values and not members:
         _mend_variable(section, findings)
@@ -286,19 +287,15 @@ def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Eds
 
 def _mend_name(section: Section, findings: EdsFindings) -> None:
     if not section.values.get("ParameterName"):
-        findings.warn(section.line, f"[{section.name}] has no ParameterName")
+        findings.mend(section, "", "has no ParameterName")
         section.values["ParameterName"] = f"Object {section.name}"
 
 
 def _check_count(section: Section, found: int, findings: EdsFindings) -> None:
     text = section.values.get("SubNumber")
-    if text is None:
-        return
-    if _number(text) != found:
-        findings.warn(
-            section.lines["SubNumber"],
-            f"[{section.name}] SubNumber is {text or 'empty'}, but {found} sub-indices follow",
-        )
+    if text is not None and _number(text) != found:
+        said = f"SubNumber is {text or 'empty'}, but {found} sub-indices follow"
+        findings.mend(section, "SubNumber", said)
 
 
 def _mend_variable(section: Section, findings: EdsFindings) -> None:
@@ -309,13 +306,11 @@ def _mend_variable(section: Section, findings: EdsFindings) -> None:
         said = (
             f"AccessType {access!r} is none of {', '.join(_ACCESS)}" if access else "no AccessType"
         )
-        findings.warn(section.line_of("AccessType"), f"[{section.name}] {said}; taken as ro")
+        findings.mend(section, "AccessType", f"{said}; taken as ro")
         access = "ro"
     section.values["AccessType"] = access
     if _number(section.values.get("PDOMapping", "0")) is None:
-        findings.warn(
-            section.lines["PDOMapping"], f"[{section.name}] PDOMapping is not a number; taken as 0"
-        )
+        findings.mend(section, "PDOMapping", "PDOMapping is not a number; taken as 0")
         section.values["PDOMapping"] = "0"
     if kind in _BITS:
         _mend_numbers(section, _BITS[kind], kind in _SIGNED, findings)
@@ -330,10 +325,7 @@ def _mend_type(section: Section, findings: EdsFindings) -> int:
         return 0
     if kind not in _BITS and kind not in _OTHER_TYPES:
         what = "unknown" if kind <= _LAST_STANDARD else "a structure of the maker's"
-        findings.warn(
-            section.lines["DataType"],
-            f"[{section.name}] data type {kind:X}h is {what}; read as plain bytes",
-        )
+        findings.mend(section, "DataType", f"data type {kind:X}h is {what}; read as plain bytes")
         section.values["DataType"] = _BYTES
         kind = int(_BYTES, 0)
     return kind
@@ -354,7 +346,7 @@ def _mend_numbers(section: Section, bits: int, signed: bool, findings: EdsFindin
         value = _read_number(section, key, bare, findings)
         if value is None or not -(1 << bits - 1) <= value < 1 << bits:
             reason = "is not a number" if value is None else f"does not fit into {bits} bits"
-            findings.warn(section.lines[key], f"[{section.name}] {key} {text!r} {reason}; left out")
+            findings.mend(section, key, f"{key} {text!r} {reason}; left out")
             del section.values[key]
         elif relative:
             section.values[key] = f"$NODEID+{value:#x}" if value >= 0 else f"$NODEID{value}"
@@ -375,13 +367,13 @@ def _mend_node_id(section: Section, node: int | None, findings: EdsFindings) -> 
         return
     base = _number(default.removeprefix("$NODEID+")) or 0
     meant = (value & _COB_ID) - (base & _COB_ID)
-    said = f"[{section.name}] ParameterValue {text} stands against DefaultValue {default}: "
+    said = f"ParameterValue {text} stands against DefaultValue {default}: "
     if 1 <= meant <= _NODES and node in (None, meant):
         section.values["ParameterValue"] = f"$NODEID+{value - meant:#x}"
         said += f"it is of node {meant}, read as $NODEID+{value - meant:#x}"
     else:
         said += "it is the same for every node" + (f", {node} included" if node else "")
-    findings.warn(section.line_of("ParameterValue"), said)
+    findings.mend(section, "ParameterValue", said)
 
 
 def _of_type(value: int, bits: int, signed: bool) -> int:
@@ -396,9 +388,7 @@ def _names(sections: dict[str, Section], owner: Section, findings: EdsFindings) 
         return []
     _without_zeros(names, ("NrOfEntries",), findings)
     if _number(names.values.get("NrOfEntries", "")) is None or "CompactSubObj" not in owner.values:
-        findings.warn(
-            names.line, f"[{names.name}] is left out: it names no compact array's entries"
-        )
+        findings.mend(names, "", "is left out: it names no compact array's entries")
         return []
     return [names]
 
@@ -416,7 +406,7 @@ def _check_lists(
             findings.warn(1, f"the mandatory object {index:04X}h is missing")
     for index, section in objects.items():
         if index >= _FIRST_OBJECT and index not in listed:
-            findings.warn(section.line, f"[{section.name}] is in no list of objects")
+            findings.mend(section, "", "is in no list of objects")
 
 
 def _check_list(section: Section, objects: dict[int, Section], findings: EdsFindings) -> set[int]:
@@ -425,18 +415,13 @@ def _check_list(section: Section, objects: dict[int, Section], findings: EdsFind
     for key, text in entries.items():
         index = _number(text)
         if index is None:
-            findings.warn(section.lines[key], f"[{section.name}] {key}={text} is not an index")
+            findings.mend(section, key, f"{key}={text} is not an index")
         else:
             listed.add(index)
             if index not in objects:
-                findings.warn(
-                    section.lines[key], f"[{section.name}] lists {index:04X}h, which has no section"
-                )
+                findings.mend(section, key, f"lists {index:04X}h, which has no section")
     said = section.values.get("SupportedObjects", "")
     if _number(said) != len(entries):
-        findings.warn(
-            section.line_of("SupportedObjects"),
-            f"[{section.name}] SupportedObjects is {said or 'missing'}, "
-            f"but {len(entries)} are listed",
-        )
+        text = f"SupportedObjects is {said or 'missing'}, but {len(entries)} are listed"
+        findings.mend(section, "SupportedObjects", text)
     return listed

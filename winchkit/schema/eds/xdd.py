@@ -6,7 +6,7 @@ application process (``uniqueIDRef``), which then has its type, access and value
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from xml.parsers import expat
 
 from winchkit.schema.eds.repair import MANDATORY, EdsFindings, Section
@@ -58,13 +58,6 @@ class _Element:
     attributes: dict[str, str]
     parents: tuple[str, ...]
     text: str = ""
-
-
-@dataclass
-class _Parameter:
-    """A parameter of the application process, in keys of CiA 306."""
-
-    values: dict[str, str] = field(default_factory=dict)
 
 
 def read_xml(text: str, findings: EdsFindings) -> list[Section]:
@@ -145,38 +138,38 @@ def _elements(text: str, findings: EdsFindings) -> list[_Element]:
     return [] if findings.faults else found
 
 
-def _parameters(elements: list[_Element]) -> dict[str, _Parameter]:
-    found: dict[str, _Parameter] = {}
-    current: _Parameter | None = None
+def _parameters(elements: list[_Element]) -> dict[str, dict[str, str]]:
+    """Parameters of the application process by their identifier, in keys of CiA 306."""
+    found: dict[str, dict[str, str]] = {}
+    current: dict[str, str] | None = None
     for one in elements:
         if one.name == "parameter":
-            current = found.setdefault(one.attributes.get("uniqueID", ""), _Parameter())
+            current = found.setdefault(one.attributes.get("uniqueID", ""), {})
             access = one.attributes.get("access", "read")
-            current.values["AccessType"] = _ACCESS.get(access, access)
+            current["AccessType"] = _ACCESS.get(access, access)
         elif current is None or "parameter" not in one.parents:
             continue
         elif one.parents[-1] == "parameter" and one.name in _TYPES:
-            current.values["DataType"] = f"0x{_TYPES[one.name]:04X}"
+            current["DataType"] = f"0x{_TYPES[one.name]:04X}"
         elif one.parents[-1] == "parameter" and one.name in ("defaultValue", "actualValue"):
-            current.values[_OBJECT[one.name]] = one.attributes.get("value", "")
+            current[_OBJECT[one.name]] = one.attributes.get("value", "")
         elif one.name in ("minValue", "maxValue"):
             key = "LowLimit" if one.name == "minValue" else "HighLimit"
-            current.values.setdefault(key, one.attributes.get("value", ""))
+            current.setdefault(key, one.attributes.get("value", ""))
     return found
 
 
 def _object(
-    name: str, one: _Element, parameters: dict[str, _Parameter], findings: EdsFindings
+    name: str, one: _Element, parameters: dict[str, dict[str, str]], findings: EdsFindings
 ) -> Section:
     """Section of an object; its own attributes count before those of its parameter."""
     own = {_OBJECT[key]: value for key, value in one.attributes.items() if key in _OBJECT}
     if "DataType" in own:
         own["DataType"] = f"0x{own['DataType'].removeprefix('0x')}"
     reference = one.attributes.get("uniqueIDRef")
-    parameter = parameters.get(reference or "")
-    if reference is not None and parameter is None:
+    if reference is not None and reference not in parameters:
         findings.warn(one.line, f"[{name}] refers to parameter '{reference}', which is missing")
-    values = {**(parameter.values if parameter is not None else {}), **own}
+    values = {**parameters.get(reference or "", {}), **own}
     way = values.get("PDOMapping", "no")
     values["PDOMapping"] = "0" if way == "no" else "1"
     if way in _ONE_WAY and values.get("AccessType") == "rw":

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from winchkit.errors import FileError, suggest
+from winchkit.errors import suggest
 from winchkit.schema.bench import BenchSpec, CellWiring, latch_path
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.profiles.robot import RobotProfile
@@ -54,17 +54,18 @@ def bench(
     path = reading.source.path
     named = {"name": reading.stem, **tree, "path": path, "latch_file": latch_path(path)}
     spec = reading.table(BenchSpec, named)
-    for index, file in enumerate(spec.effect_files if spec is not None else ()):
+    if spec is None:
+        return None
+    for index, file in enumerate(spec.effect_files):
         if not file.is_file():
             at: Key = ("effects", index)
             reading.fault(at, f"no such file of effects: {file}; paths start at this file's folder")
-    if spec is not None and not (spec.winch or spec.cells):
+    if not (spec.winch or spec.cells):
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
-    if spec is not None and spec.cells and spec.robot is not None:
+    if spec.cells and spec.robot is not None:
         reading.fault(("robot",), "its winches have no profile, servo and limits")
-    if spec is not None:
-        _check_deviations(reading, spec)
-    if spec is not None and spec.robot is not None:
+    _check_deviations(reading, spec)
+    if spec.robot is not None:
         _check_robot(reading, spec, spec.robot, read_robot)
     return spec
 
@@ -113,13 +114,8 @@ def _check_robot(
         message = "is false; the winches of a robot stop together, or cables go slack or break"
         reading.fault(("stop_together",), message)
     at: Key = ("robot", "profile")
-    path = reading.shipped("profiles", robot.profile, at)
-    if path is None:
-        return
-    try:
-        profile = read_robot(path)
-    except FileError as error:
-        reading.faults += error.faults
+    profile = reading.declared("profiles", robot.profile, at, read_robot)
+    if profile is None:
         return
     for line in profile.line:
         if line.name not in spec.winch:
@@ -253,13 +249,8 @@ def _check_device(
         known = ", ".join(buses) or "none"
         near = suggest(bus, list(buses))
         reading.fault((*at, "bus"), f"there is no [bus.{bus}]; buses are {known}{near}")
-    path = reading.shipped("devices", raw.get("device"), (*at, "device"))
-    if path is None:
-        return
-    try:
-        device = read_device(path)
-    except FileError as error:
-        reading.faults += error.faults
+    device = reading.declared("devices", raw.get("device"), (*at, "device"), read_device)
+    if device is None:
         return
     servo = device.servo is not None
     if servo != (at[-1] == "servo"):

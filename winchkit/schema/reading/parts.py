@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -103,6 +103,15 @@ class FileReading:
         if "effect" in tree:
             tree["effect"] = self.effects(tree["effect"], at)
         return tree
+
+    def declared(self, kind: Kind, name: object, at: Key, read: Callable[[Path], T]) -> T | None:
+        """The declaration that this one names; notes its faults."""
+        path = self.shipped(kind, name, at)
+        try:
+            return None if path is None else read(path)
+        except FileError as error:
+            self.faults += error.faults
+            return None
 
     def shipped(self, kind: Kind, name: object, at: Key) -> Path | None:
         """The file of a declaration that this one names; notes a fault where there is none."""

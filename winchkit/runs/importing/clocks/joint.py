@@ -1,16 +1,25 @@
-"""Files joined to one run: by the names of points, by time stamps, or by cross-correlation."""
+"""Files joined to one run: by the names of points, by time stamps, or by cross-correlation.
+
+Signals that follow each other are a quantity that both files have, or a tension and a torque, a
+cable length and an angle; of a robot's lines and a tracker, those of :mod:`multilateration`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.clocks.cross_correlation import Agreement
-from winchkit.runs.importing.clocks.lag import agreement_of, shifted, span_of
+from winchkit.runs.importing.clocks.cross_correlation import (
+    Agreement,
+    TimedSignal,
+    correlated,
+    signals_by_base,
+)
+from winchkit.runs.importing.clocks.multilateration import pose_agreement
 from winchkit.runs.importing.clocks.point_names import by_names
 from winchkit.runs.importing.streams import Stream, Streams
 
@@ -191,3 +200,74 @@ def _unknown(first: Streams, other: Streams, found: Agreement | None) -> str:
         f"the difference of its clock from that of {first.path} is not known: {why}; give it as "
         '--lag, "0 s" for one clock'
     )
+
+
+_PAIRS = (
+    ("motor_angle", "motor_angle"),
+    ("tension", "tension"),
+    ("cable_length", "cable_length"),
+    ("motor_torque", "motor_torque"),
+    ("motor_velocity", "motor_velocity"),
+    ("cable_length", "motor_angle"),
+    ("tension", "motor_torque"),
+    ("load", "motor_torque"),
+    ("load", "tension"),
+    ("platform_x", "motor_angle"),
+    ("platform_y", "motor_angle"),
+    ("platform_z", "motor_angle"),
+    ("position", "position"),
+    ("velocity", "velocity"),
+    ("force", "force"),
+    ("force", "tension"),
+)
+"""Channels that follow each other up to a scale, an offset and a small error."""
+
+
+def agreement_of(first: Streams, second: Streams) -> Agreement | None:
+    """Lag of two files by the channel pair with the largest correlation.
+
+    Returns: None without channels that follow each other.
+    """
+    best = pose_agreement(first, second)
+    has_pose = best is not None
+    for one, two in _signals(first, second):
+        if has_pose and "platform_" in f"{one.channel} {two.channel}":
+            continue
+        found = correlated(one, two)
+        if found is None:
+            continue
+        better = best is None or (found.is_known, abs(found.correlation)) > (
+            best.is_known,
+            abs(best.correlation),
+        )
+        if better:
+            best = found
+    return best
+
+
+def span_of(streams: Streams) -> tuple[float, float]:
+    """First and last time of a file, s."""
+    times = [item.time for item in streams.streams if len(item.time)]
+    return min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
+
+
+def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float = 0.0) -> Streams:
+    """Streams on another clock: t + lag + drift (t − reference).
+
+    ``lag``: s. ``reference``: time at which the lag is valid, s. Returns: the same samples.
+    """
+    moved = tuple(
+        replace(item, time=item.time + lag + drift * (item.time - reference))
+        for item in streams.streams
+    )
+    return replace(streams, streams=moved)
+
+
+def _signals(first: Streams, second: Streams) -> Iterator[tuple[TimedSignal, TimedSignal]]:
+    """Pairs of signals of the two files."""
+    ours, theirs = signals_by_base(first), signals_by_base(second)
+    for one, two in _PAIRS:
+        for a, b in {(one, two), (two, one)}:
+            for left in ours.get(a, ()):
+                for right in theirs.get(b, ()):
+                    yield left, right

@@ -75,6 +75,4 @@ def _places(streams: Streams, names: Sequence[str]) -> dict[str, int]:
 def _at(streams: Streams, places: NDArray[np.intp]) -> Streams:
     """Some samples of a file with one stream, in another order."""
     (stream,) = streams.streams
-    channels = {name: values[places] for name, values in stream.channels.items()}
-    chosen = replace(stream, time=stream.time[places], channels=channels, rows=stream.rows[places])
-    return replace(streams, streams=(chosen,))
+    return replace(streams, streams=(stream.at(places),))

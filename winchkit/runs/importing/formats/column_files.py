@@ -11,7 +11,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
-from winchkit.runs.importing.table import ColumnTable, refuse_size
+from winchkit.runs.importing.table import ColumnTable, readable, refuse_size
 from winchkit.runs.importing.unit_spelling import split_unit
 
 _OBJECTS = (
@@ -57,13 +57,11 @@ def read_parquet(path: str, data: bytes) -> ColumnTable:
     pa = library("pyarrow", f"{path}: Parquet")
     from pyarrow import parquet
 
-    try:
+    with readable(path, "Parquet file"):
         source = parquet.ParquetFile(io.BytesIO(data))
         shape = source.metadata.num_rows * source.metadata.num_columns
         refuse_size(path, 8 * shape, "columns")
         table = source.read()
-    except (OSError, ValueError, pa.ArrowException) as error:
-        raise RunError(Fault(f"is not a readable Parquet file: {error}", path)) from None
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     for field, column in zip(table.schema, table.columns, strict=True):

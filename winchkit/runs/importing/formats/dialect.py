@@ -106,7 +106,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
     ``delimiter``: one character; a blank stands for any number of blanks.
     """
     if '"' not in line:
-        return line.split() if delimiter == BLANKS else _cells(line, delimiter)
+        return line.split() if delimiter == BLANKS else [c.strip() for c in line.split(delimiter)]
     if delimiter == BLANKS:
         line = " ".join(line.split())
     try:
@@ -114,10 +114,6 @@ def split_line(line: str, delimiter: str) -> list[str]:
     except csv.Error:
         cells = line.split(delimiter)
     return [cell.strip() for cell in cells]
-
-
-def _cells(line: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in line.split(delimiter)]
 
 
 def find_dialect(lines: Sequence[str]) -> Dialect | None:

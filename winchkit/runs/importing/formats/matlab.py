@@ -18,7 +18,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
-from winchkit.runs.importing.table import ColumnTable, refuse_size
+from winchkit.runs.importing.table import ColumnTable, readable, refuse_size
 
 _DEEPEST = 8
 """Nesting of structures that is read; those of Simulink have up to five levels."""
@@ -34,8 +34,8 @@ def read_mat(path: str, data: bytes) -> ColumnTable:
     """
     from scipy.io import loadmat, whosmat
 
-    try:
-        stream: Any = io.BytesIO(data)
+    stream: Any = io.BytesIO(data)
+    with readable(path, "MAT file"):
         try:
             size = 8 * sum(int(np.prod(shape)) for _, shape, _ in whosmat(stream))
         except TypeError:
@@ -47,10 +47,6 @@ def read_mat(path: str, data: bytes) -> ColumnTable:
             warnings.simplefilter("ignore")
             stream.seek(0)
             found = loadmat(stream, simplify_cells=True)
-    except RunError:
-        raise
-    except Exception as error:  # noqa: BLE001 - scipy raises many kinds for damaged files
-        raise RunError(Fault(f"is not a readable MAT file: {error}", path)) from None
     arrays: dict[str, Any] = {}
     notes = []
     for name, value in found.items():
@@ -117,36 +113,31 @@ def read_hdf5(path: str, data: bytes) -> ColumnTable:
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     notes: list[str] = []
-    try:
-        with h5py.File(io.BytesIO(data), "r") as source:
-            sets: dict[str, Any] = {}
+    with readable(path, "HDF5 file"), h5py.File(io.BytesIO(data), "r") as source:
+        sets: dict[str, Any] = {}
 
-            def visit(name: str, item: Any) -> None:
-                is_internal = name.startswith("#")
-                is_elsewhere = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
-                if isinstance(item, h5py.Dataset) and not is_internal and not is_elsewhere:
-                    sets[name.replace("/", ".")] = item
+        def visit(name: str, item: Any) -> None:
+            is_internal = name.startswith("#")
+            is_elsewhere = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
+            if isinstance(item, h5py.Dataset) and not is_internal and not is_elsewhere:
+                sets[name.replace("/", ".")] = item
 
-            source.visititems(visit)
-            refuse_size(path, 8 * sum(int(item.size or 0) for item in sets.values()), "arrays")
-            for name, item in sets.items():
-                kind = item.attrs.get("MATLAB_class", b"")
-                if "MATLAB_object_decode" in item.attrs:
-                    notes.append(_object_note(name, _text(kind)))
-                    continue
-                if item.attrs.get("MATLAB_empty", 0):
-                    # Its numbers are the shape of an empty array.
-                    continue
-                if item.dtype.kind not in "fiub" and not item.dtype.names:
-                    continue
-                if kind in (b"char", b"cell", "char", "cell") or item.dtype.hasobject:
-                    continue
-                arrays[name] = item[()]
-                unit = item.attrs.get("units", item.attrs.get("unit", ""))
-                units[name] = _text(unit)
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, UnicodeDecodeError) as error:
-        if isinstance(error, RunError):
-            raise
-        raise RunError(Fault(f"is not a readable HDF5 file: {error}", path)) from None
+        source.visititems(visit)
+        refuse_size(path, 8 * sum(int(item.size or 0) for item in sets.values()), "arrays")
+        for name, item in sets.items():
+            kind = item.attrs.get("MATLAB_class", b"")
+            if "MATLAB_object_decode" in item.attrs:
+                notes.append(_object_note(name, _text(kind)))
+                continue
+            if item.attrs.get("MATLAB_empty", 0):
+                # Its numbers are the shape of an empty array.
+                continue
+            if item.dtype.kind not in "fiub" and not item.dtype.names:
+                continue
+            if kind in (b"char", b"cell", "char", "cell") or item.dtype.hasobject:
+                continue
+            arrays[name] = item[()]
+            unit = item.attrs.get("units", item.attrs.get("unit", ""))
+            units[name] = _text(unit)
     _refuse_objects(path, arrays, notes)
     return table_of_arrays(path, "HDF5", arrays, units=units, notes=notes)

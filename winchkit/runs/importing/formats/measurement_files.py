@@ -17,7 +17,13 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, WinchkitError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import column_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart, refuse_size
+from winchkit.runs.importing.table import (
+    ColumnTable,
+    FileColumn,
+    named_apart,
+    readable,
+    refuse_size,
+)
 
 _NUMBERS = "fiub"
 """Kinds of arrays (NumPy) that hold numbers or truth values."""
@@ -102,15 +108,11 @@ def read_tdms(path: str, data: bytes) -> ColumnTable:
     """
     nptdms = library("nptdms", f"{path}: TDMS")
     notes: list[str] = []
-    try:
+    with readable(path, "TDMS file"):
         file = nptdms.TdmsFile.read(io.BytesIO(data))
         refuse_size(path, 8 * sum(len(c) for g in file.groups() for c in g.channels()), "channels")
         columns = [column for group in file.groups() for column in _of_group(group, notes)]
         metadata = {str(key): str(value) for key, value in file.properties.items()}
-    except WinchkitError:
-        raise
-    except Exception as error:  # noqa: BLE001 - the library raises many kinds
-        raise RunError(Fault(f"is not a readable TDMS file: {error}", path)) from None
     return _table(path, "TDMS", columns, metadata, notes)
 
 

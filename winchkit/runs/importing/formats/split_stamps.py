@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
 
 _FRACTIONS = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3}
 """Seconds of one unit of the fraction."""
@@ -76,10 +76,10 @@ def _spelled(column: FileColumn) -> str:
 
 def _is_whole(column: FileColumn, limit: float) -> bool:
     """Whether a column has whole numbers from 0 to below a limit."""
-    known = column.values[np.isfinite(column.values)]
+    known = column.known
     if column.texts is not None or not len(known):
         return False
-    return bool(np.all((known == np.round(known)) & (known >= 0) & (known < limit)))
+    return bool(are_whole(known) and np.all((known >= 0) & (known < limit)))
 
 
 def _joined(whole: FileColumn, part: FileColumn, word: str) -> FileColumn:

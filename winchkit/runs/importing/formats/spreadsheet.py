@@ -13,7 +13,7 @@ from winchkit.extras import library
 from winchkit.runs.importing.formats.dialect import Dialect, has_cell_units
 from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
-from winchkit.runs.importing.table import ColumnTable, named_apart, refuse_size
+from winchkit.runs.importing.table import ColumnTable, named_apart, readable, refuse_size
 
 
 def read_workbook(path: str, data: bytes) -> ColumnTable:
@@ -23,17 +23,13 @@ def read_workbook(path: str, data: bytes) -> ColumnTable:
     openpyxl; RunError for an invalid workbook, and one without rows of numbers.
     """
     openpyxl = library("openpyxl", f"{path}: XLSX")
-    try:
+    with readable(path, "workbook"):
         with zipfile.ZipFile(io.BytesIO(data)) as packed:
             refuse_size(path, sum(item.file_size for item in packed.infolist()), "a workbook")
         book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
         sheets = {
             sheet.title: _rows(sheet.iter_rows(values_only=True)) for sheet in book.worksheets
         }
-    except RunError:
-        raise
-    except Exception as error:  # noqa: BLE001 - openpyxl raises whatever its XML parser raises
-        raise RunError(Fault(f"is not a readable workbook: {error}", path)) from None
     tables = {}
     for title, rows in sheets.items():
         width = max((len(cells) for _, cells in rows), default=0)

@@ -49,8 +49,7 @@ class Stamps:
 
 def is_stamp(cell: str) -> bool:
     """Whether a cell is a date, a time of day or both."""
-    text = _plain(cell)
-    return any(pattern.fullmatch(text) for pattern in _PATTERNS)
+    return _match(cell) is not None
 
 
 def read_stamps(cells: Sequence[str]) -> Stamps:
@@ -103,13 +102,9 @@ def epoch_unit(values: Array) -> str | None:
     return None
 
 
-def _plain(cell: str) -> str:
-    text = cell.strip().strip('"').strip()
-    return _NAMED.sub("", text, count=1) if text[:1].isalpha() else text
-
-
 def _match(cell: str) -> re.Match[str] | None:
-    text = _plain(cell)
+    text = cell.strip().strip('"').strip()
+    text = _NAMED.sub("", text, count=1) if text[:1].isalpha() else text
     return next((m for pattern in _PATTERNS if (m := pattern.fullmatch(text))), None)
 
 

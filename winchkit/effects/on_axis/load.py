@@ -1,0 +1,64 @@
+"""Torque of what an axis moves: weight of a part, spring."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.stages import At, Stage
+
+
+def _joint_gravity(torque: Array, at: At, values: Values) -> Array:
+    return torque + values["amplitude"] * np.sin(at.drum_angle + values["phase"])
+
+
+JOINT_GRAVITY = Effect(
+    id="joint-gravity",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("amplitude", "N m", null=0.0, typical=1.0, low=0.0, high=1e6),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+    ),
+    apply=_joint_gravity,
+    outputs=("motor_torque",),
+    part="load",
+    variable="drum_angle",
+    what="The axis carries a part whose centre of mass is not on it.",
+    formula="τ + a sin(φ + p), a = m g l / ratio, φ the angle of the joint",
+    source="statics of a pendulum; minimal parameters m l of robot dynamics (Khalil, Dombre 2002)",
+    looks_like="A sine of the joint angle in the torque, the same in both directions.",
+    confused_with=("drum-unbalance", "spring-balancer", "motor-coulomb-asymmetry"),
+    told_apart="A stroke of at least a quarter turn: a short one is a straight line.",
+    needs=("axis",),
+    polar=("amplitude", "phase"),
+    order=-2,
+)
+
+
+def _spring_balancer(torque: Array, at: At, values: Values) -> Array:
+    return torque + (values["stiffness"] * at.drum_angle + values["torque"])
+
+
+SPRING_BALANCER = Effect(
+    id="spring-balancer",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("stiffness", "N m/rad", null=0.0, typical=1e-3, low=-1e6, high=1e6),
+        Parameter("torque", "N m", null=0.0, typical=0.01, low=-1e6, high=1e6),
+    ),
+    apply=_spring_balancer,
+    outputs=("motor_torque",),
+    part="load",
+    variable="drum_angle",
+    reduces_to=("motor-coulomb-asymmetry",),
+    what="A spring, or a counterweight with a chain, acts on the moving part.",
+    formula="τ + k φ + c, φ the drum angle since the reference",
+    source="Hooke's law; weight balancing of arms and doors by springs",
+    looks_like="A torque error that is a straight line over the position, at every load.",
+    confused_with=("cable-weight", "joint-gravity", "motor-coulomb-asymmetry"),
+    told_apart="The tension: the weight of the cable is in it, a spring at the drum is not.",
+    family="motor friction",
+    contains=("motor-coulomb-asymmetry",),
+    order=-2,
+)

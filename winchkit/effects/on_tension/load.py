@@ -1,0 +1,73 @@
+"""Effects on the tension between load and pulleys: weight of the cable, lever of the load."""
+
+from __future__ import annotations
+
+from math import sin
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.model.stages import At, Stage
+from winchkit.units import GRAVITY
+
+MASS_PER_LENGTH = Parameter(
+    "mass_per_length",
+    "kg/m",
+    null=0.0,
+    typical=0.14,
+    low=0.0,
+    high=50.0,
+    plausible=Plausible(0.0, 20.0, "a steel cable of 70 mm has 20 kg/m"),
+)
+"""Of the cable."""
+
+
+def _cable_weight(tension: Array, at: At, values: Values) -> Array:
+    """Tension plus the weight of the free cable along its direction."""
+    along = GRAVITY * sin(at.profile.path.inclination)
+    return tension + values["mass_per_length"] * along * at.free_length
+
+
+CABLE_WEIGHT = Effect(
+    id="cable-weight",
+    stage=Stage.CABLE_WEIGHT,
+    parameters=(MASS_PER_LENGTH,),
+    apply=_cable_weight,
+    outputs=("tension", "motor_torque"),
+    variable="cable_length",
+    what="The weight of the free cable adds to the tension towards the winch.",
+    formula="T + m g ℓ sin(inclination)",
+    source="statics; 6 mm steel cable 0.14 kg/m",
+    looks_like="A tension error in proportion to the free length, at any load.",
+    confused_with=("cell-offset", "cell-drift"),
+    told_apart="The full stroke, up and down.",
+    needs=("load",),
+)
+
+
+def _load_lever(tension: Array, at: At, values: Values) -> Array:
+    return tension * (1.0 + values["amplitude"] * np.sin(at.drum_angle + values["phase"]))
+
+
+LOAD_LEVER = Effect(
+    id="load-lever",
+    stage=Stage.CABLE_WEIGHT,
+    parameters=(
+        Parameter("amplitude", "1", null=0.0, typical=0.02, low=0.0, high=10.0),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+    ),
+    apply=_load_lever,
+    outputs=("tension", "motor_torque"),
+    part="load",
+    variable="drum_angle",
+    what="The load acts through a lever, whose effective arm changes with its angle.",
+    formula="(1 + a sin(φ + p)) T, φ the drum angle",
+    source="statics: the arm of a force on a lever is its length times the cosine of its angle",
+    looks_like="A sine of the drum angle in tension and torque, in proportion to the load.",
+    confused_with=("drum-eccentricity", "drum-unbalance", "cell-gain"),
+    told_apart="Two loads; the tension, which an eccentric or unbalanced drum leaves unchanged.",
+    needs=("load",),
+    order=1,
+    polar=("amplitude", "phase"),
+)
