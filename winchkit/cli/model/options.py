@@ -17,7 +17,6 @@ from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, checked
-from winchkit.cli.core.output import keep_json
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.programme import ALL
 
@@ -37,9 +36,6 @@ profile_option = click.option(
     help="Profile: a name or a file.",
 )
 runs_argument = click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=RUN)
-json_option = click.option(
-    "--json", "as_json", is_flag=True, callback=keep_json, help="Print the answer as JSON."
-)
 
 
 def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:

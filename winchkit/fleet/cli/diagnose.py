@@ -9,9 +9,8 @@ import click
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.model.options import json_option
 
 
 @click.command(
@@ -45,7 +44,7 @@ from winchkit.cli.model.options import json_option
     help="Processes; 1 needs no Dask.  [default: by cores and memory]",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Workers of this Dask scheduler instead.")
-@json_option
+@json_flag("Print the answer as JSON.")
 def command(
     *,
     folder: str,
@@ -54,7 +53,6 @@ def command(
     band: float | None,
     jobs: int | None,
     scheduler: str | None,
-    as_json: bool,
 ) -> int:
     """Diagnose the runs of every winch and session below DIR that have no diagnosis yet.
 
@@ -76,10 +74,7 @@ def command(
         )
     for session, reason in report.failures.items():
         note(f"{session}: {reason}")
-    if as_json:
-        echo_json(report.to_json())
-    else:
-        counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
-        click.echo(f"{counts}, {len(report.failures)} failed")
-        suggest_next("library", "list", folder)
+    counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
+    tell(report.to_json(), [f"{counts}, {len(report.failures)} failed"])
+    suggest_next("library", "list", folder)
     return 1 if report.failures else 0
