@@ -28,7 +28,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import BenchCells
     from winchkit.calibration.cell.fit import CellFit
-    from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
 _AT_REST = 4.0
@@ -129,7 +128,9 @@ def command(
     for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
         click.echo(line, err=is_json())
     if html is not None:
-        _write_page(html, calibration, fit, needed)
+        from winchkit.report.pages.cell_calibration import report_page
+
+        write_page(html, report_page(calibration, fit, needed))
     if figures is not None:
         from winchkit.report.pages.cell_calibration import cell_figures
 
@@ -174,14 +175,6 @@ def _found(
         name = _force_cell(cell, bench)
         found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
     return found if serial is None else replace(found, serial=serial)
-
-
-def _write_page(
-    path: str, calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis
-) -> None:
-    from winchkit.report.pages.cell_calibration import report_page
-
-    write_page(path, report_page(calibration, fit, needed))
 
 
 def _calibration(

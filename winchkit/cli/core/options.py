@@ -89,13 +89,18 @@ def bench_file_option(
 
 
 bench_option = bench_file_option(callback=bench_by_default)
-effects_option: Decorator = click.option(
-    "--effects",
+
+
+def own_effects_option(help: str = "Your own effects.", name: str = "effect_files") -> Decorator:
+    """The option ``--effects``: Python files with effects; the command gets them by ``name``."""
+    return click.option(
+        "--effects", name, multiple=True, metavar="FILE", shell_complete=complete_file, help=help
+    )
+
+
+effects_option = own_effects_option(
+    "Python file with effects of your own that a profile has; may be given several times.",
     "effects",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Python file with effects of your own that a profile has; may be given several times.",
 )
 
 

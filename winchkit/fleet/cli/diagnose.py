@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import click
 
 from winchkit.cli.core.command import Example, ToolCommand
-from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 
@@ -28,14 +28,7 @@ from winchkit.cli.core.terminal import progress_bar
 @click.option(
     "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Your own effects.",
-)
+@own_effects_option()
 @click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz.")
 @click.option(
     "--jobs",

@@ -8,8 +8,9 @@ from typing import Any
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_effect, complete_file
+from winchkit.cli.core.completion import complete_effect
 from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import html_option, write_page
@@ -43,14 +44,7 @@ from winchkit.errors import UsageError, suggest
     metavar="EFFECT.PARAMETER=VALUE",
     help="Value that must not be reached; a trend towards it has a date.",
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Your own effects.",
-)
+@own_effects_option()
 @html_option
 @json_flag("Print the answer as JSON.")
 def command(
