@@ -155,7 +155,6 @@ def command(
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import optional, quantity
-    from winchkit.robot.bench.self_calibration import PoseVolume
     from winchkit.robot.calibration.options import Options
     from winchkit.robot.calibration.pose_design import next_poses
 
@@ -168,6 +167,8 @@ def command(
         )
     with progress_bar() as progress:
         if not runs:
+            from winchkit.robot.bench.self_calibration import PoseVolume
+
             volume = PoseVolume(quantity(box, "length"), quantity(turn, "angle"))
             wanted = optional(accuracy, "length")
             series = PoseSeries(
