@@ -80,7 +80,7 @@ def test_a_wrong_value_names_its_key_and_writes_nothing(
 def test_the_terminal_asks_until_the_answer_can_be_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("winchkit.cli.model.profile._may_ask", lambda _: True)
+    monkeypatch.setattr("winchkit.cli.model.profile.may_ask", lambda: True)
     answers = ["grooved", "60", "60 mm", "5 mm", "", "20.4", *[""] * 9, "4 m", "", "40 mm", ""]
     target = tmp_path / "asked.toml"
     typed = "\n".join([*answers, ""])

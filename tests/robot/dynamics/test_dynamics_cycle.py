@@ -50,7 +50,7 @@ def test_a_cycle_is_the_batched_inverse_dynamics(kernels: RobotKernels) -> None:
     cycle = DynamicsCycle(ROBOT, MIDDLE, 1e-3, inertia=np.zeros(8), kernels=kernels)
     for k in range(20):
         found = cycle.update(
-            kernels.array(flat_pose(Pose(pose.position[k : k + 1], pose.rotation[k : k + 1]))),
+            kernels.array(flat_pose(pose[k : k + 1])),
             kernels.array(motion.velocity[k].tolist()),
             kernels.array(motion.acceleration[k].tolist()),
         )
@@ -73,7 +73,7 @@ def test_inertia_of_the_winches_takes_the_torque_of_their_acceleration() -> None
     added = []
     cycles = [DynamicsCycle(ROBOT, MIDDLE, period, inertia=np.full(8, j)) for j in (0.0, inertia)]
     for k in range(300):
-        at = flat_pose(Pose(pose.position[k : k + 1], pose.rotation[k : k + 1]))
+        at = flat_pose(pose[k : k + 1])
         rates = motion.velocity[k].tolist(), motion.acceleration[k].tolist()
         without, with_inertia = (list(c.update(at, *rates).motor_torque) for c in cycles)
         added.append(np.subtract(with_inertia, without))

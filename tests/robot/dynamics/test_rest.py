@@ -113,4 +113,4 @@ def test_a_hanging_platform_is_planned_through_its_poses_of_rest() -> None:
 
 
 def motion_end(pose: Pose) -> Pose:
-    return Pose(pose.position[-1:], pose.rotation[-1:])
+    return pose[-1:]

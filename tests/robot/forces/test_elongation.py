@@ -35,7 +35,7 @@ LAWS = (LINEAR, QUARTIC, EXPONENTIAL)
 
 
 def flat(pose: Pose, p: int) -> list[float]:
-    return flat_pose(Pose(pose.position[p : p + 1], pose.rotation[p : p + 1]))
+    return flat_pose(pose[p : p + 1])
 
 
 def reference_forces(robot: Robot, middle: float = 500.0) -> Array:

@@ -15,6 +15,7 @@ from winchkit.effects import Term, load_catalogue
 from winchkit.robot import (
     Pose,
     Robot,
+    gravity_wrench,
     robot_of,
     robot_with_terms,
     rotation_of,
@@ -23,7 +24,7 @@ from winchkit.robot import (
 from winchkit.robot.calibration.calibrate import equations_of
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
-from winchkit.robot.forces.balance import balance, force_basis
+from winchkit.robot.forces.balance import force_basis
 from winchkit.robot.geometry.constraints import mean_offset
 from winchkit.robot.geometry.pose_estimation import (
     Iteration,
@@ -89,19 +90,21 @@ def test_lines_with_effects_have_the_lengths_of_the_winding_laws(dataset: RobotD
         np.testing.assert_allclose(residual, found[kind], rtol=0, atol=1e-12)
 
 
-def test_the_two_whitenings_of_the_balance_differ_by_an_orthogonal_matrix(
+def test_the_whitening_of_the_balance_is_that_of_cholesky_but_for_an_orthogonal_matrix(
     dataset: RobotDataset,
 ) -> None:
     made, state = equations(dataset)
     pose, geometry = state.pose, robot().geometry
     platform, tension = PlatformSpec(3.0, (0.01, 0.0, -0.02)), dataset.measured.tension
-    rows = balance(geometry, pose, tension, platform).residual
+    structure = structure_matrix(geometry, pose.position, pose.rotation)
+    left = (structure @ tension[..., None])[..., 0] + gravity_wrench(platform, pose.rotation)
+    factor = np.linalg.cholesky(structure @ np.swapaxes(structure, 1, 2))
+    rows = np.linalg.solve(factor, left[..., None])[..., 0]
     changed = replace(robot(), platform=platform)
     np.testing.assert_allclose(
         np.sum(rows**2, axis=1),
         np.sum(made.residuals(state, changed, ["balance"])["balance"] ** 2, axis=1),
     )
-    structure = structure_matrix(geometry, pose.position, pose.rotation)
     whiten, to_cables = force_basis(structure)
     whitened = whiten @ structure
     np.testing.assert_allclose(

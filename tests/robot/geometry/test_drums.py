@@ -131,7 +131,7 @@ def test_the_cycle_is_the_batch(kernels: RobotKernels, kind: str, turns: float) 
     expected, straight = robot.motor_angles(poses, strain), robot.motor_angles(poses)
     lengths = robot.lengths(poses)
     for p in range(20):
-        pose = kernels.array(flat_pose(Pose(poses.position[p : p + 1], poses.rotation[p : p + 1])))
+        pose = kernels.array(flat_pose(poses[p : p + 1]))
         np.testing.assert_allclose(cycle.motor_angles(pose), straight[p], atol=1e-10)
         np.testing.assert_allclose(cycle.motor_angles(pose, held), expected[p], atol=1e-10)
         found = cycle.pose_at(kernels.array(lengths[p].tolist()))

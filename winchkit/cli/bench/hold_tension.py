@@ -8,12 +8,14 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.bench.holding import hold_on
+from winchkit.cli.bench.holding import hold_on, until_rest
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
+    duration_option,
     effects_option,
+    quantity_option,
     take_over_option,
 )
 from winchkit.cli.core.output import json_flag, tell
@@ -41,33 +43,20 @@ _READINGS = 10
 @click.argument("winch", metavar="WINCH")
 @click.argument("tension", metavar="TENSION", type=QuantityType("force", example="120 N"))
 @bench_option
-@click.option(
-    "--for",
-    "duration",
-    metavar="TIME",
-    type=QuantityType("time", example="5 s"),
-    help="Stop after this time.  [default: until Ctrl-C]",
-)
-@click.option(
+@duration_option("Stop after this time.  [default: until Ctrl-C]", "5 s")
+@quantity_option(
     "--travel",
-    metavar="LENGTH",
-    type=QuantityType("length", example="0.1 m"),
+    of="length",
     default="0.1 m",
-    show_default=True,
     help="Cable either way from its place at the start; the winch trips where it is used up.",
 )
-@click.option(
-    "--speed",
-    metavar="SPEED",
-    type=QuantityType("speed", example="20 mm/s"),
-    default="20 mm/s",
-    show_default=True,
-    help="Largest speed, without a direction.",
+@quantity_option(
+    "--speed", of="speed", default="20 mm/s", help="Largest speed, without a direction."
 )
-@click.option(
+@quantity_option(
     "--stiffness",
-    metavar="STIFFNESS",
-    type=QuantityType("stiffness", example="40 kN/m"),
+    of="stiffness",
+    example="40 kN/m",
     help="Upper bound of cable and structure.  [default: by the profile's cable]",
 )
 @take_over_option
@@ -94,7 +83,7 @@ def command(
     where the tension is more than 1 % from TENSION at the end of --for. A robot's platform:
     `winchkit hold-platform`.
     """
-    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+    from winchkit.bench.control.dead_man import DEAD_MAN
     from winchkit.bench.control.tension_control import HELD
     from winchkit.cli.core.dry_run import station_for
     from winchkit.cli.core.quantities import optional, quantity, seconds
@@ -123,8 +112,7 @@ def command(
             lambda: shown.append(station.status()["winch"][winch]["load_tension"]),
         )
         station.release(winch)
-        while station.moving(winch):
-            station.clock.sleep(REFRESH)
+        until_rest(station, winch)
         status = station.status()
     if dry_run:
         return

@@ -1,4 +1,4 @@
-"""Refreshes a held motion for a time, as long as this process runs without a gap."""
+"""Waits of commands that move: refreshing a held motion for a time, and until all is at rest."""
 
 from __future__ import annotations
 
@@ -27,3 +27,11 @@ def hold_on(
         clock.sleep(min(REFRESH, left))
         station.refresh(winch, hold=DEAD_MAN)
         look()
+
+
+def until_rest(station: Station, winch: str | None) -> None:
+    """Return at the end of a motion; raises what ended it before."""
+    from winchkit.bench.control.dead_man import REFRESH
+
+    while station.moving(winch):
+        station.clock.sleep(REFRESH)

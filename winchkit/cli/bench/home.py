@@ -11,11 +11,11 @@ from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
     effects_option,
+    quantity_option,
     take_over_option,
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
@@ -32,27 +32,21 @@ _POLL = 0.02
 )
 @winch_argument
 @bench_option
-@click.option(
-    "--here",
-    metavar="LENGTH",
-    type=QuantityType("length", example="2 m"),
-    help="The present cable length; nothing moves.",
+@quantity_option(
+    "--here", of="length", example="2 m", help="The present cable length; nothing moves."
 )
 @click.option(
     "--method",
     type=click.IntRange(-128, 127),
     help="Of 6098h: 17, 18 limit switch, 19 to 22 home switch, 33, 34 index; negative: maker's.",
 )
-@click.option(
-    "--at",
-    metavar="LENGTH",
-    type=QuantityType("length", example="0.5 m"),
-    help="With --method: cable length at the zero found.",
+@quantity_option(
+    "--at", of="length", example="0.5 m", help="With --method: cable length at the zero found."
 )
-@click.option(
+@quantity_option(
     "--speed",
-    metavar="SPEED",
-    type=QuantityType("speed", example="20 mm/s"),
+    of="speed",
+    example="20 mm/s",
     help="Cable speed.  [default: a tenth of the winch's limit]",
 )
 @take_over_option

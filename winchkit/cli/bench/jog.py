@@ -15,18 +15,19 @@ from winchkit.cli.bench.direction_option import (
     magnitude,
     read_direction,
 )
-from winchkit.cli.bench.holding import hold_on
+from winchkit.cli.bench.holding import hold_on, until_rest
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_bench
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
+    duration_option,
     effects_option,
+    quantity_option,
     take_over_option,
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line, unknown_length
 from winchkit.errors import NotPermitted, UsageError
 
@@ -48,17 +49,11 @@ _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 @winch_argument
 @bench_option
 @direction_options("SPEED|LENGTH")
-@click.option(
-    "--for",
-    "duration",
-    metavar="TIME",
-    type=QuantityType("time", example="2 s"),
-    help="With a SPEED: move for this long, then stop.",
-)
-@click.option(
+@duration_option("With a SPEED: move for this long, then stop.", "2 s")
+@quantity_option(
     "--speed",
-    metavar="SPEED",
-    type=QuantityType("speed", example="0.05 m/s"),
+    of="speed",
+    example="0.05 m/s",
     help=f"With keys, or with a LENGTH: how fast; no direction.  [default: {_SPEED}]",
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")
@@ -102,7 +97,7 @@ def command(
             return
         if asked.duration is None:
             station.step(winch, **asked.direction.length, speed=asked.speed)
-            _wait(station, winch)
+            until_rest(station, winch)
         else:
             _jog_for(station, winch, asked.direction.speed, asked.duration)
         if not dry_run:
@@ -150,7 +145,7 @@ def _jog_for(station: Station, winch: str | None, speed: DirectionKeyword, durat
     station.jog(winch, **speed)
     hold_on(station, winch, duration)
     station.release(winch)
-    _wait(station, winch)
+    until_rest(station, winch)
 
 
 def _require_length(station: Station, winch: str | None) -> None:
@@ -164,13 +159,6 @@ def _require_length(station: Station, winch: str | None) -> None:
             f"{unknown_length(status, name)}; until then only a jog by keys that are held is "
             "permitted: `winchkit jog` without --for"
         )
-
-
-def _wait(station: Station, winch: str | None) -> None:
-    from winchkit.bench.control.dead_man import REFRESH
-
-    while station.moving(winch):
-        station.clock.sleep(REFRESH)
 
 
 def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:

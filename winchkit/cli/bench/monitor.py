@@ -10,9 +10,8 @@ import click
 
 from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.options import bench_option
+from winchkit.cli.core.options import bench_option, duration_option, quantity_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import cell, live_table
 from winchkit.errors import one_line
 
@@ -30,20 +29,8 @@ if TYPE_CHECKING:
     ),
 )
 @bench_option
-@click.option(
-    "--period",
-    type=QuantityType("time", example="0.2 s"),
-    default="0.2 s",
-    show_default=True,
-    help="Time between two pictures.",
-)
-@click.option(
-    "--for",
-    "duration",
-    metavar="TIME",
-    type=QuantityType("time", example="10 s"),
-    help="End after this time.",
-)
+@quantity_option("--period", of="time", default="0.2 s", help="Time between two pictures.")
+@duration_option("End after this time.")
 @json_flag("Print one JSON object a line.")
 def command(*, bench: str, period: str, duration: str | None) -> None:
     """Show the winches of a bench until Ctrl-C. Moves nothing.

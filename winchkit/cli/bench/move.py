@@ -8,27 +8,24 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
+from winchkit.cli.bench.holding import until_rest
 from winchkit.cli.bench.pose_option import pose_line, read_pose
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
     effects_option,
+    quantity_option,
     take_over_option,
     winch_argument,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-    from winchkit.bench.remote.operations import Station
-
-_POLL = 0.05
-"""s between two looks at a move; it delays the end of the command only."""
 
 
 @click.command(
@@ -41,25 +38,20 @@ _POLL = 0.05
 )
 @winch_argument
 @bench_option
-@click.option(
-    "--to",
-    metavar="LENGTH",
-    type=QuantityType("length", example="2 m"),
-    help="Cable length to go to.",
-)
+@quantity_option("--to", of="length", example="2 m", help="Cable length to go to.")
 @direction_options("LENGTH")
 @click.option("--pose", metavar="POSE", help="Pose of the robot's platform, x=0.1m,yaw=2deg.")
 @click.option("--pose-by", metavar="POSE", help="Change of that pose.")
-@click.option(
+@quantity_option(
     "--speed",
-    metavar="SPEED",
-    type=QuantityType("speed", example="0.1 m/s"),
+    of="speed",
+    example="0.1 m/s",
     help="Speed, without a direction.  [default: limit of winch or robot]",
 )
-@click.option(
+@quantity_option(
     "--acceleration",
-    metavar="ACCELERATION",
-    type=QuantityType("acceleration", example="0.5 m/s^2"),
+    of="acceleration",
+    example="0.5 m/s^2",
     help="[default: limit of winch or robot]",
 )
 @take_over_option
@@ -106,7 +98,7 @@ def command(
             if take_over:
                 station.take_over(ALL)
             station.move_pose(goal, pose is None, limit, gentle)
-            _wait(station, ALL)
+            until_rest(station, ALL)
             status, there = station.status(), station.pose()
         if not dry_run:
             tell({**status, "pose": there}, [pose_line(there)])
@@ -124,12 +116,7 @@ def command(
         if take_over:
             station.take_over(winch)
         station.move(winch, to=target, **change, speed=limit, acceleration=gentle)
-        _wait(station, winch)
+        until_rest(station, winch)
         status = station.status()
     if not dry_run:
         tell(status, [status_line(status)])
-
-
-def _wait(station: Station, winch: str | None) -> None:
-    while station.moving(winch):
-        station.clock.sleep(_POLL)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit import wings
+from winchkit.cli.bench.holding import until_rest
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_folder, check_winches
 from winchkit.cli.core.messages import note, suggest_next
@@ -18,18 +19,16 @@ from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
     effects_option,
-    output_option,
+    format_option,
+    runs_folder_option,
 )
-from winchkit.cli.core.output import is_json, json_flag, tell
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.standard_input import forget_typed, is_standard_input
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
     from winchkit.schema.programme import Programme, ProgrammeStep
-
-_POLL = 0.05
-"""s between two looks at a programme; it delays the end of the command only."""
 
 
 @click.command(
@@ -41,17 +40,8 @@ _POLL = 0.05
 )
 @click.argument("programme", type=PROGRAMME)
 @bench_option
-@output_option(
-    "Folder for the runs.",
-    "DIR",
-    "--out",
-    default=".",
-    show_default=True,
-    type=click.Path(file_okay=False, path_type=Path),
-)
-@click.option(
-    "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
-)
+@runs_folder_option
+@format_option
 @click.option(
     "-y",
     "--yes",
@@ -86,16 +76,7 @@ def command(
     path = programme_path(programme)
     value = load(path).value
     if (by_wing := wings.call("run_command", value)) is not None:
-        by_wing(
-            value,
-            bench,
-            effects,
-            output,
-            f".{suffix}",
-            replace=replace,
-            dry_run=dry_run,
-            as_json=is_json(),
-        )
+        by_wing(value, bench, effects, output, f".{suffix}", replace=replace, dry_run=dry_run)
         return
     declared = read_programme(path)
     if is_standard_input(programme) and not yes and any(step.ask for step in declared.step):
@@ -174,8 +155,7 @@ def _rehearse(bench: str, programme: Programme, effects: Sequence[str]) -> None:
                 speed=step.speed,
                 acceleration=step.acceleration,
             )
-            while station.moving(step.winch):
-                station.clock.sleep(_POLL)
+            until_rest(station, step.winch)
 
 
 def _ask(step: ProgrammeStep) -> None:

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from winchkit.cli.core.command import Example, ToolCommand
-from winchkit.cli.core.completion import complete_bench, complete_winch
+from winchkit.cli.core.completion import complete_winch
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import TABLE, bench_by_default
+from winchkit.cli.core.options import (
+    TABLE,
+    bench_by_default,
+    bench_file_option,
+    duration_option,
+    quantity_option,
+)
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import figures_option, write_figures, write_page
 from winchkit.errors import UsageError
@@ -23,7 +28,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import BenchCells
     from winchkit.calibration.cell.fit import CellFit
-    from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
 _AT_REST = 4.0
@@ -48,13 +52,8 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     ),
 )
 @click.argument("cell", required=False, shell_complete=complete_winch, is_eager=True)
-@click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    callback=_bench,
-    help="Bench file; not needed with --points.  [default: the only one of this folder]",
+@bench_file_option(
+    "Bench file; not needed with --points.  [default: the only one of this folder]", callback=_bench
 )
 @click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
 @click.option("--series", default=3, show_default=True, help="Number of series, up and down.")
@@ -66,25 +65,13 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     help="Fit these points instead of measuring.",
 )
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
-@click.option(
-    "--for",
-    "duration",
-    type=QuantityType("time", example="3 s"),
-    default="3 s",
-    show_default=True,
-    help="Averaging time per weight.",
-)
-@click.option(
-    "--settle",
-    type=QuantityType("time", example="2 s"),
-    default="2 s",
-    show_default=True,
-    help="Waiting time after a weight is hung.",
-)
+@duration_option("Averaging time per weight.", default="3 s")
+@quantity_option("--settle", of="time", default="2 s", help="Waiting time after a weight is hung.")
 @click.option("--serial", help="Serial number of the cell; else what the device says.")
-@click.option(
+@quantity_option(
     "--temperature",
-    type=QuantityType("temperature", example="21 degC"),
+    of="temperature",
+    example="21 degC",
     help='Temperature at the cell, e.g. "21 degC".',
 )
 @click.option(
@@ -141,7 +128,9 @@ def command(
     for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
         click.echo(line, err=is_json())
     if html is not None:
-        _write_page(html, calibration, fit, needed)
+        from winchkit.report.pages.cell_calibration import report_page
+
+        write_page(html, report_page(calibration, fit, needed))
     if figures is not None:
         from winchkit.report.pages.cell_calibration import cell_figures
 
@@ -186,14 +175,6 @@ def _found(
         name = _force_cell(cell, bench)
         found = _from_file(name, bench, points) if points else _measure(name, bench, **guided)
     return found if serial is None else replace(found, serial=serial)
-
-
-def _write_page(
-    path: str, calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis
-) -> None:
-    from winchkit.report.pages.cell_calibration import report_page
-
-    write_page(path, report_page(calibration, fit, needed))
 
 
 def _calibration(

@@ -13,10 +13,9 @@ import click
 
 from winchkit.cli.cell.options import cells, shown, unit_of
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_bench, complete_winch
-from winchkit.cli.core.options import TABLE, bench_by_default
+from winchkit.cli.core.completion import complete_winch
+from winchkit.cli.core.options import TABLE, bench_by_default, bench_file_option, duration_option
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError, one_line
 
 if TYPE_CHECKING:
@@ -45,13 +44,7 @@ _MEANINGS = {
     ),
 )
 @click.argument("cell", required=False, shell_complete=complete_winch)
-@click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    help="Bench file; not needed with --run.  [default: the only one of this folder]",
-)
+@bench_file_option("Bench file; not needed with --run.  [default: the only one of this folder]")
 @click.option(
     "--run",
     metavar="FILE",
@@ -61,14 +54,7 @@ _MEANINGS = {
 @click.option(
     "-c", "--column", metavar="COLUMN", help="Column of the cell in FILE, by its name or number."
 )
-@click.option(
-    "--for",
-    "duration",
-    type=QuantityType("time", example="10 s"),
-    default="10 s",
-    show_default=True,
-    help="Duration of the readings.",
-)
+@duration_option("Duration of the readings.", default="10 s")
 @json_flag("Print the result as JSON.")
 @click.pass_context
 def command(

@@ -9,8 +9,8 @@ import click
 
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
 from winchkit.cli.core.command import ToolCommand
+from winchkit.cli.core.options import duration_option
 from winchkit.cli.core.output import tell
-from winchkit.cli.core.quantity_type import QuantityType
 
 
 @click.command(
@@ -57,14 +57,7 @@ def _lines_of_info(facts: dict[str, Any], unit: str) -> Iterator[str]:
     ),
 )
 @cell_options
-@click.option(
-    "--for",
-    "duration",
-    type=QuantityType("time", example="3 s"),
-    default="3 s",
-    show_default=True,
-    help="Duration of the measurement.",
-)
+@duration_option("Duration of the measurement.", default="3 s")
 def rate(cell: str | None, bench: str, duration: str) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
     from winchkit.cli.core.quantities import quantity

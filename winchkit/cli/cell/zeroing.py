@@ -12,9 +12,8 @@ import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.options import yes_option
+from winchkit.cli.core.options import duration_option, yes_option
 from winchkit.cli.core.output import tell
-from winchkit.cli.core.quantity_type import QuantityType
 
 _TASKS = {
     (False, False): "host tare",
@@ -33,14 +32,7 @@ _TASKS = {
     ),
 )
 @cell_options
-@click.option(
-    "--for",
-    "duration",
-    type=QuantityType("time", example="1 s"),
-    default="1 s",
-    show_default=True,
-    help="Averaging time.",
-)
+@duration_option("Averaging time.", default="1 s")
 @click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")
 @click.option("--device", is_flag=True, help="Send the device its own volatile tare instead.")
 def tare(cell: str | None, bench: str, duration: str, *, clear: bool, device: bool) -> None:
@@ -96,14 +88,7 @@ def _told(task: str, result: dict[str, Any], unit: str) -> str:
     ),
 )
 @cell_options
-@click.option(
-    "--for",
-    "duration",
-    type=QuantityType("time", example="1 s"),
-    default="1 s",
-    show_default=True,
-    help="Averaging time.",
-)
+@duration_option("Averaging time.", default="1 s")
 def zero(cell: str | None, bench: str, duration: str) -> None:
     """Send the device of CELL its zero command: the present load becomes its gross zero.
 

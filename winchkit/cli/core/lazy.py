@@ -128,7 +128,7 @@ class LazyGroup(Group):
 def _name_variables(command: click.Command, prefix: str) -> None:
     """Name the environment variables of a command after its options as they are typed.
 
-    click itself would take the name of the Python argument, such as ``as_json`` for ``--json``.
+    click itself would take the name of the Python argument, such as ``duration`` for ``--for``.
     """
     for option in command.params:
         if isinstance(option, click.Option) and option.envvar is None:

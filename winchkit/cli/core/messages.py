@@ -59,7 +59,7 @@ def suggest_next(*words: str | Sequence[str]) -> None:
     from winchkit.cli.core.output import is_json
 
     context = click.get_current_context(silent=True)
-    if context is None or context.params.get("as_json") or is_json():
+    if context is None or is_json():
         return
     flat = [word for item in words for word in ([item] if isinstance(item, str) else item)]
     if context.meta.get(COPY_OF_INPUT) in flat:

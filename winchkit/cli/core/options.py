@@ -22,6 +22,7 @@ from winchkit.cli.core.completion import (
 )
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.standard_input import Readable
 from winchkit.errors import UsageError
 
@@ -72,7 +73,10 @@ def _only_bench() -> str | None:
     return str(here[0])
 
 
-def _bench_option(callback: Callable[..., Any] | None = None) -> Decorator:
+def bench_file_option(
+    help: str = "Bench file.  [default: the only one of this folder]",
+    callback: Callable[..., Any] | None = None,
+) -> Decorator:
     """The option ``-b`` of a bench file."""
     return click.option(
         "-b",
@@ -80,18 +84,23 @@ def _bench_option(callback: Callable[..., Any] | None = None) -> Decorator:
         metavar="FILE",
         shell_complete=complete_bench,
         callback=callback,
-        help="Bench file.  [default: the only one of this folder]",
+        help=help,
     )
 
 
-bench_option = _bench_option(bench_by_default)
-effects_option: Decorator = click.option(
-    "--effects",
+bench_option = bench_file_option(callback=bench_by_default)
+
+
+def own_effects_option(help: str = "Your own effects.", name: str = "effect_files") -> Decorator:
+    """The option ``--effects``: Python files with effects; the command gets them by ``name``."""
+    return click.option(
+        "--effects", name, multiple=True, metavar="FILE", shell_complete=complete_file, help=help
+    )
+
+
+effects_option = own_effects_option(
+    "Python file with effects of your own that a profile has; may be given several times.",
     "effects",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Python file with effects of your own that a profile has; may be given several times.",
 )
 
 
@@ -125,7 +134,7 @@ def bench_argument(function: Callable[..., Any]) -> Callable[..., Any]:
         expose_value=False,
         callback=_keep_argument,
     )
-    return argument(_bench_option(_bench_of_either)(function))
+    return argument(bench_file_option(callback=_bench_of_either)(function))
 
 
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
@@ -149,6 +158,24 @@ device_option: Decorator = click.option(
 )
 
 
+def quantity_option(
+    *names: str, of: str, help: str, example: str = "", default: str | None = None
+) -> Decorator:
+    """An option that is a quantity; its default is the example of its messages, too.
+
+    ``names``: as of click. ``of``: dimension.
+    """
+    kind = QuantityType(of, example=default or example)
+    shown = default is not None
+    return click.option(*names, type=kind, default=default, show_default=shown, help=help)
+
+
+def duration_option(help: str, example: str = "10 s", default: str | None = None) -> Decorator:
+    """The option ``--for``: how long something lasts."""
+    names = ("--for", "duration")
+    return quantity_option(*names, of="time", help=help, example=example, default=default)
+
+
 def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:
     """The option ``-o``: where a command writes; ``names`` are further spellings of it.
 
@@ -169,6 +196,19 @@ def checked(check: Callable[[str, str], None]) -> Callable[..., Any]:
         return value
 
     return callback
+
+
+runs_folder_option = output_option(
+    "Folder for the runs.",
+    "DIR",
+    "--out",
+    default=".",
+    show_default=True,
+    type=click.Path(file_okay=False, path_type=Path),
+)
+format_option: Decorator = click.option(
+    "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
+)
 
 
 @dataclass(frozen=True)
@@ -213,7 +253,7 @@ class BusChoice:
 def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add --bench or, in its place, the options of a CAN bus."""
     options = [
-        _bench_option(),
+        bench_file_option(),
         click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
         click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
         click.option(

@@ -17,6 +17,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from winchkit.cli.core.messages import COPY_OF_INPUT, note
+from winchkit.cli.core.output import is_json
 from winchkit.cli.core.terminal import EscapedStream
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
@@ -53,6 +54,11 @@ def forget_typed() -> None:
     import termios
 
     termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
+
+
+def may_ask() -> bool:
+    """Whether somebody can answer: a terminal, and nobody wants JSON."""
+    return not is_json() and sys.stdin.isatty() and sys.stderr.isatty()
 
 
 class Readable(click.ParamType):  # type: ignore[type-arg]

@@ -10,8 +10,7 @@ import click
 
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import PROFILE, effects_option, output_option
-from winchkit.cli.core.quantity_type import QuantityType
+from winchkit.cli.core.options import PROFILE, effects_option, output_option, quantity_option
 
 
 @click.command(
@@ -30,11 +29,7 @@ from winchkit.cli.core.quantity_type import QuantityType
     type=click.Choice(["c", "python", "mjcf", "json"]),
     help="A header in C99, a Python module, a model of MuJoCo, or the formulas as JSON.",
 )
-@click.option(
-    "--load-mass",
-    type=QuantityType("mass", example="10 kg"),
-    help="Mass on the cable, for MuJoCo.",
-)
+@quantity_option("--load-mass", of="mass", example="10 kg", help="Mass on the cable, for MuJoCo.")
 @effects_option
 @output_option("File to write; by default standard output.")
 def command(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +13,7 @@ from winchkit.cli.core.messages import is_quiet, note, suggest_next
 from winchkit.cli.core.options import TABLE, device_option, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import QuantityType, naming
+from winchkit.cli.core.standard_input import may_ask
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
 from winchkit.cli.files.import_runs import inspected, targets_in, targets_of, write_runs
@@ -189,7 +189,7 @@ def command(
     masses = _masses(load_masses, len(files))
     tables = _tables(files, devices)
     declared = None if mapping is None else read_mapping(mapping)
-    ask = asked if _may_ask(yes) else None
+    ask = asked if may_ask() and not yes else None
     guesses = guesses_of(tables, read_answers(options), declared, ask)
     is_new = declared is None
     report: dict[str, Any] = {
@@ -243,11 +243,6 @@ def _tell(pairs: Iterable[tuple[str, str]]) -> None:
         click.echo(line, err=True)
 
 
-def _may_ask(yes: bool) -> bool:
-    """Whether somebody can answer: a terminal, and no request for silence."""
-    return not yes and not is_json() and sys.stdin.isatty() and sys.stderr.isatty()
-
-
 def _masses(texts: Sequence[str], count: int) -> list[str | None]:
     from winchkit.cli.core.quantities import quantity
 
@@ -296,7 +291,7 @@ def _is_accepted(guesses: Sequence[Guess], yes: bool) -> bool:
 
     if yes or (all(guess.is_certain for guess in guesses) and not are_integrated(guesses)):
         return True
-    if not _may_ask(yes):
+    if not may_ask():
         return False
     return click.confirm("Import as shown?", default=True, abort=True, err=True)
 

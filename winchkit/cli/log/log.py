@@ -12,13 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.bench.remote.interruption import Terminated
-from winchkit.cli.core.completion import complete_bench
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import suggest_next
-from winchkit.cli.core.options import bench_by_default, effects_option, output_option
+from winchkit.cli.core.options import (
+    bench_by_default,
+    bench_file_option,
+    duration_option,
+    effects_option,
+    output_option,
+    quantity_option,
+)
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError, WinchkitError
 
 if TYPE_CHECKING:
@@ -54,32 +59,14 @@ _SHOW_PERIOD = 0.5
         "winchkit log -b bench.toml --jsonl --for 1s",
     ),
 )
-@click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    help="Bench file.  [default: the only one of this folder]",
-)
+@bench_file_option()
 @output_option("Where to: a .csv or .mcap file.", callback=None)
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
 @click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
-@click.option(
-    "--for",
-    "duration",
-    metavar="TIME",
-    type=QuantityType("time", example="10 s"),
-    help="End after this time, e.g. 10s or '2 min'.",
-)
+@duration_option("End after this time, e.g. 10s or '2 min'.")
 @click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
-@click.option(
-    "--period",
-    type=QuantityType("time", example="0.02 s"),
-    default="0.02 s",
-    show_default=True,
-    help="Time between two live pictures.",
-)
+@quantity_option("--period", of="time", default="0.02 s", help="Time between two live pictures.")
 @effects_option
 @click.option("--strict", is_flag=True, help="Exit with 1 where a drive or instrument fell silent.")
 @json_flag("Print the result as JSON.")

@@ -10,7 +10,7 @@ import click
 from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import is_verbose
-from winchkit.cli.core.output import is_json, json_flag, tell
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
@@ -72,7 +72,7 @@ def command(
     if is_simulated and (asked.each or not isinstance(declared, WinchProfile)):
         raise UsageError("--forward simulates one winch or axis; choose one with --winch")
     if asked.each and isinstance(declared, WinchProfile):
-        wings.part("fleet", "compare_command")(runs, declared, asked, is_json(), html, figures)
+        wings.part("fleet", "compare_command")(runs, declared, asked, html, figures)
         return
     with progress_bar() as progress:
         own = asked.runs(runs, declared)

@@ -76,7 +76,7 @@ def command(
     refuse_options(declared, asked.band, asked.winch)
     if asked.each and isinstance(declared, WinchProfile):
         by_winch = wings.part("fleet", "diagnose_command")
-        by_winch(runs, declared, asked, how, is_json(), html, figures)
+        by_winch(runs, declared, asked, how, html, figures)
     else:
         _tell_one(runs, declared, asked, how, html, figures)
 
@@ -109,10 +109,10 @@ def _tell_one(
         for each in known:  # The bar has ended: nothing is printed into its line.
             # Errors and candidates so far, no verdict.
             (echo_json if is_json() else click.echo)(
-                each.diagnosis.to_json() if is_json() else said(each, False)
+                each.diagnosis.to_json() if is_json() else said(each)
             )
         raise
-    (echo_json if is_json() else click.echo)(said(answer, is_json()))
+    (echo_json if is_json() else click.echo)(said(answer))
     if html:
         write_page(html, answer_page(answer, page_title(declared.name, runs), asked))
     if figures:
@@ -167,9 +167,9 @@ def answer_page(answer: Answer, title: str, asked: Asked) -> str:
     return report_html(answer, title, profile=asked.profile, options=asked.options)
 
 
-def said(answer: Answer, as_json: bool) -> Any:
+def said(answer: Answer) -> Any:
     """An answer as JSON data or as text, without the data behind it."""
-    if as_json:
+    if is_json():
         from winchkit.report.as_json import report_json
 
         return report_json(answer)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_effect, complete_file
+from winchkit.cli.core.completion import complete_effect
 from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -77,14 +78,7 @@ def command() -> None:
     ),
 )
 @click.argument("words", metavar="[ID|WORD]...", nargs=-1, shell_complete=complete_effect)
-@click.option(
-    "--effects",
-    "files",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Python file with effects of your own; may be given several times.",
-)
+@own_effects_option("Python file with effects of your own; may be given several times.", "files")
 @json_flag("Print JSON, complete, in SI units.")
 @html_option
 def show(words: Sequence[str], files: Sequence[str], html: str | None) -> None:

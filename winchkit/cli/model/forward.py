@@ -8,9 +8,15 @@ import click
 
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import PROFILE, PROGRAMME, RUN, effects_option, output_option
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import QuantityType
+from winchkit.cli.core.options import (
+    PROFILE,
+    PROGRAMME,
+    RUN,
+    effects_option,
+    output_option,
+    quantity_option,
+)
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 
 
@@ -27,24 +33,19 @@ from winchkit.cli.core.terminal import progress_bar
 @click.option(
     "--reference", type=RUN, metavar="RUN", help="Run whose motor angle [control] follows."
 )
-@click.option(
+@quantity_option(
     "--load-mass",
-    type=QuantityType("mass", example="10 kg"),
+    of="mass",
+    example="10 kg",
     help="Mass on the cable; by default that of the run or the programme.",
 )
 @click.option(
     "--initial-speed", metavar="VALUE", help="Speed at the start; by default that of the run."
 )
-@click.option(
-    "--rate",
-    type=QuantityType("frequency", example="100 Hz"),
-    default="100 Hz",
-    show_default=True,
-    help="Sampling rate of a programme.",
-)
+@quantity_option("--rate", of="frequency", default="100 Hz", help="Sampling rate of a programme.")
 @effects_option
 @output_option("The simulated run: a .csv or .mcap file.", required=True)
-@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@json_flag("Print the summary as JSON.")
 def command(
     *,
     profile: str,
@@ -56,7 +57,6 @@ def command(
     rate: str,
     effects: Sequence[str],
     output: str,
-    as_json: bool,
 ) -> None:
     """Simulate the motion of PROFILE with its effects and write it as a run, without noise.
 
@@ -90,5 +90,4 @@ def command(
     write_run(run, output)
     summary = summary_of(run)
     note(f"{output}: {summary.text}")
-    if as_json:
-        echo_json({"schema": 1, "profile": profile, "output": output, "summary": summary})
+    tell({"profile": profile, "output": output, "summary": summary}, [])

@@ -13,11 +13,9 @@ import click
 
 from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import PROFILE, RUN, checked
-from winchkit.cli.core.output import keep_json
+from winchkit.cli.core.options import PROFILE, RUN, checked, own_effects_option
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.programme import ALL
 
@@ -37,9 +35,6 @@ profile_option = click.option(
     help="Profile: a name or a file.",
 )
 runs_argument = click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=RUN)
-json_option = click.option(
-    "--json", "as_json", is_flag=True, callback=keep_json, help="Print the answer as JSON."
-)
 
 
 def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
@@ -57,14 +52,7 @@ _MODEL_OPTIONS = (
         help="Column of another model's prediction: motor_torque=tau_model.",
     ),
     click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
-    click.option(
-        "--effects",
-        "effect_files",
-        multiple=True,
-        metavar="FILE",
-        shell_complete=complete_file,
-        help="Your own effects.",
-    ),
+    own_effects_option(),
     profile_option,
 )
 

@@ -14,7 +14,7 @@ from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import files_of_kind
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import BENCH, output_option
-from winchkit.cli.core.output import is_json, json_flag, tell
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
@@ -70,7 +70,7 @@ def command(runs: Sequence[str], output: str | None, bench: str | None, asked: A
 
     declared = declared_profile(asked.source)
     if (by_wing := wings.call("plan_command", declared)) is not None:
-        by_wing(runs, declared, asked, output, bench, is_json())
+        by_wing(runs, declared, asked, output, bench)
     else:
         _plan_winch(runs, require_winch(declared), asked, output, bench)
 

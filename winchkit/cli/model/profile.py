@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -13,7 +12,8 @@ from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.model.options import json_option
+from winchkit.cli.core.output import is_json, json_flag
+from winchkit.cli.core.standard_input import may_ask
 from winchkit.errors import UsageError
 from winchkit.profile_edit.drawing import (
     DRUMS,
@@ -80,10 +80,8 @@ def _options(function: Callable[..., Any]) -> Callable[..., Any]:
     help=f"{PULLEY[0].upper()}{PULLEY[1:]}, such as '{PULLEY_EXAMPLE}'.",
 )
 @click.option("--replace", is_flag=True, help="Write over an earlier file.")
-@json_option
-def new(
-    *, file: str, pulleys: Sequence[str], replace: bool, as_json: bool, **given: str | None
-) -> None:
+@json_flag("Print the answer as JSON.")
+def new(*, file: str, pulleys: Sequence[str], replace: bool, **given: str | None) -> None:
     """Write FILE.toml, the profile of a winch from the values of its drawing.
 
     What is unknown is left out: the file and the command list it, with what the model does without
@@ -95,11 +93,11 @@ def new(
     check_output(file, (".toml",))
     values = {field.key: given["_".join(field.place)] or "" for field in FIELDS}
     lacking = any(not field.without and not values[field.key] for field in asked(values))
-    if lacking and _may_ask(as_json):
+    if lacking and may_ask():
         pulleys = _ask(values, pulleys)
     unknown = new_profile(file, values, pulleys, replace=replace)
     note(f"written: {file}")
-    if as_json:
+    if is_json():
         echo_json({"schema": 1, "profile": file, "unknown": unknown})
     elif unknown:
         from winchkit.report.words.columns import hanging
@@ -107,11 +105,6 @@ def new(
         click.echo("unknown, and what the model does without it")
         click.echo("\n".join(hanging([[key, words] for key, words in unknown.items()])))
     suggest_next("diagnose", "RUN...", "-p", file)
-
-
-def _may_ask(as_json: bool) -> bool:
-    """Whether somebody can answer: a terminal."""
-    return not as_json and sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _ask(values: dict[str, str], pulleys: Sequence[str]) -> Sequence[str]:

@@ -11,9 +11,14 @@ import click
 from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import suggest_next
-from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
+from winchkit.cli.core.options import (
+    PROGRAMME,
+    SIM_BENCH,
+    format_option,
+    quantity_option,
+    runs_folder_option,
+)
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import UsageError
 
@@ -43,22 +48,14 @@ _RATE = 50.0
     help="Another motion programme, as PROGRAMME.",
 )
 @click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
-@click.option(
+@quantity_option(
     "--rate",
-    type=QuantityType("frequency", example="50 Hz"),
+    of="frequency",
+    example="50 Hz",
     help=f"Sampling rate, by default {_RATE:g} Hz; a robot's log has the rows of its bench.",
 )
-@output_option(
-    "Folder for the runs.",
-    "DIR",
-    "--out",
-    default=".",
-    show_default=True,
-    type=click.Path(file_okay=False, path_type=Path),
-)
-@click.option(
-    "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
-)
+@runs_folder_option
+@format_option
 @click.option(
     "--hidden",
     multiple=True,

@@ -11,7 +11,7 @@ from winchkit.catalog import find
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
 from winchkit.cli.core.early_checks import check_bench, check_file
-from winchkit.cli.core.options import PROFILE, RUN
+from winchkit.cli.core.options import PROFILE, RUN, own_effects_option
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.model.options import declared_profile
 from winchkit.errors import UsageError
@@ -41,7 +41,7 @@ from winchkit.errors import UsageError
     help="Simulated bench to start and show.",
 )
 @click.option("--allow-motion", is_flag=True, help="The page may move the bench.")
-@click.option("--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects.")
+@own_effects_option()
 @click.option("--folder", default=".", show_default=True, help="Folder of the library view.")
 @click.option("--port", default=0, metavar="PORT", help="Port; a free one by default.")
 @click.option("--mystery", type=int, metavar="SEED", help="Runs of a bench with a hidden effect.")

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import click
 
 from winchkit.cli.core.command import Example, ToolCommand
-from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.options import own_effects_option
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.model.options import json_option
 
 
 @click.command(
@@ -29,14 +28,7 @@ from winchkit.cli.model.options import json_option
 @click.option(
     "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Your own effects.",
-)
+@own_effects_option()
 @click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz.")
 @click.option(
     "--jobs",
@@ -45,7 +37,7 @@ from winchkit.cli.model.options import json_option
     help="Processes; 1 needs no Dask.  [default: by cores and memory]",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Workers of this Dask scheduler instead.")
-@json_option
+@json_flag("Print the answer as JSON.")
 def command(
     *,
     folder: str,
@@ -54,7 +46,6 @@ def command(
     band: float | None,
     jobs: int | None,
     scheduler: str | None,
-    as_json: bool,
 ) -> int:
     """Diagnose the runs of every winch and session below DIR that have no diagnosis yet.
 
@@ -76,10 +67,7 @@ def command(
         )
     for session, reason in report.failures.items():
         note(f"{session}: {reason}")
-    if as_json:
-        echo_json(report.to_json())
-    else:
-        counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
-        click.echo(f"{counts}, {len(report.failures)} failed")
-        suggest_next("library", "list", folder)
+    counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
+    tell(report.to_json(), [f"{counts}, {len(report.failures)} failed"])
+    suggest_next("library", "list", folder)
     return 1 if report.failures else 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from winchkit.cli.core.messages import is_verbose, note
 from winchkit.cli.core.outcome import threads_abandoned
-from winchkit.cli.core.output import echo_each, echo_json
+from winchkit.cli.core.output import echo_each, echo_json, is_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.diagnose import answer_figures, answer_page, said
 from winchkit.cli.model.options import (
@@ -33,7 +33,6 @@ def tell_diagnoses(
     declared: WinchProfile,
     asked: Asked,
     how: Mapping[str, bool],
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -53,7 +52,7 @@ def tell_diagnoses(
         for name, answer in each:
             # Without the traces, which are megabytes each.
             found[name] = replace(answer.diagnosis, traces=())
-            told[name] = said(answer, as_json)
+            told[name] = said(answer)
             present[name] = answer.result.lack_of_fit_test.p_value
             if html:
                 own = answer_page(answer, f"{title}, {name}", replace(asked, winch=name))
@@ -62,7 +61,7 @@ def tell_diagnoses(
                 save_figures(figures, answer_figures(answer, asked), name)
             del answer  # hundreds of megabytes after long runs
     shared, chances = shared_effects(found, catalogue), alarms(found, present)
-    if as_json:
+    if is_json():
         together = {"effects": [one.to_json() for one in shared], "alarms": chances}
         echo_json({"schema": 1, "winches": told, "shared": together})
     else:
@@ -79,7 +78,6 @@ def tell_comparisons(
     runs: Sequence[str],
     declared: WinchProfile,
     asked: Asked,
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -109,7 +107,7 @@ def tell_comparisons(
                 save_figures(figures, comparison_figures(answer, source), name)
             del answer  # gigabytes after long runs
     shared = shared_errors(errors)
-    if as_json:
+    if is_json():
         said = {name: one.to_json() for name, one in found.items()}
         outputs = {name: one.to_json() for name, one in shared.items()}
         echo_json({"schema": 1, "winches": said, "shared": {"outputs": outputs}})

@@ -7,9 +7,8 @@ import click
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.model.options import json_option
 
 
 @click.command(
@@ -22,8 +21,8 @@ from winchkit.cli.model.options import json_option
 )
 @click.argument("folder", metavar="DIR")
 @click.option("-p", "--profile", metavar="P", type=PROFILE, help="Profile of the winches.")
-@json_option
-def command(folder: str, profile: str | None, as_json: bool) -> None:
+@json_flag("Print the answer as JSON.")
+def command(folder: str, profile: str | None) -> None:
     """Read the runs below DIR that are new or changed, and remove those that are gone.
 
     The tables are in DIR/.winchkit-library and can be deleted. Ctrl-C keeps what was read. Files
@@ -35,9 +34,7 @@ def command(folder: str, profile: str | None, as_json: bool) -> None:
         report = index_library(folder, profile, progress)
     for path, fault in report.faults.items():
         note(fault if path in fault else f"{path}: {fault}")
-    if as_json:
-        echo_json(report.to_json())
-        return
     counts = f"{len(report.indexed)} read, {report.unchanged} unchanged, "
-    click.echo(f"{counts}{len(report.removed)} removed, {len(report.faults)} with a fault")
+    counts += f"{len(report.removed)} removed, {len(report.faults)} with a fault"
+    tell(report.to_json(), [counts])
     suggest_next("library", "list", folder)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import date, datetime
+from typing import Any
 
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import QuantityType
-from winchkit.cli.model.options import json_option
+from winchkit.cli.core.options import quantity_option
+from winchkit.cli.core.output import json_flag, tell
 
 
 @click.command(
@@ -23,11 +24,8 @@ from winchkit.cli.model.options import json_option
 @click.argument("folder", metavar="DIR")
 @click.option("--winch", metavar="NAME", help="Winch, as the list names it.")
 @click.option("--programme", metavar="NAME", help="Motion programme.")
-@click.option(
-    "--load",
-    metavar="MASS",
-    type=QuantityType("mass", example="10 kg"),
-    help="Known mass on the cable, such as '10 kg'.",
+@quantity_option(
+    "--load", of="mass", example="10 kg", help="Known mass on the cable, such as '10 kg'."
 )
 @click.option("--since", metavar="DATE", help="First UTC day, YYYY-MM-DD.")
 @click.option("--until", metavar="DATE", help="Last UTC day, YYYY-MM-DD.")
@@ -36,7 +34,7 @@ from winchkit.cli.model.options import json_option
     type=click.Choice(["adequate", "explained", "partly", "unknown"]),
     help="Verdict of the session's diagnosis.",
 )
-@json_option
+@json_flag("Print the answer as JSON.")
 def command(
     *,
     folder: str,
@@ -46,7 +44,6 @@ def command(
     since: str | None,
     until: str | None,
     verdict: str | None,
-    as_json: bool,
 ) -> None:
     """List the runs of an indexed folder, in the order of winch and time."""
     from winchkit.cli.core.quantities import quantity
@@ -61,16 +58,17 @@ def command(
         until=_day("--until", until),
         verdict=verdict,
     ).to_pylist()
-    if as_json:
-        echo_json({"schema": 1, "runs": rows})
-        return
+    tell({"runs": rows}, _lines(rows))
+
+
+def _lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     width = max((len(row["winch"]) for row in rows), default=0)
     for row in rows:
         mass = "" if row["load_mass"] is None else f"{row['load_mass']:g} kg"
         facts = (row["programme"], mass, row["fault"], "" if row["complete"] else "no end")
         known = "  ".join(fact for fact in facts if fact)
         moment: datetime = row["time"]
-        click.echo(f"{row['winch']:<{width}}  {moment:%Y-%m-%d %H:%M}  {row['path']}  {known}")
+        yield f"{row['winch']:<{width}}  {moment:%Y-%m-%d %H:%M}  {row['path']}  {known}"
 
 
 def _day(option: str, text: str | None) -> date | None:

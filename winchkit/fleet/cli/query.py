@@ -8,8 +8,7 @@ import sys
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import json_option
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 
 
 @click.command(
@@ -22,8 +21,8 @@ from winchkit.cli.model.options import json_option
 )
 @click.argument("folder", metavar="DIR")
 @click.argument("sql", metavar="SQL")
-@json_option
-def command(folder: str, sql: str, as_json: bool) -> None:
+@json_flag("Print the answer as JSON.")
+def command(folder: str, sql: str) -> None:
     """Answer one SELECT over the tables runs, diagnoses and estimates, as CSV or JSON.
 
     Needs DuckDB (extra library). Nothing is changed, and no other file is read.
@@ -31,7 +30,7 @@ def command(folder: str, sql: str, as_json: bool) -> None:
     from winchkit.fleet.library.query import query_library
 
     found = query_library(folder, sql)
-    if as_json:
+    if is_json():
         echo_json({"schema": 1, "columns": found.column_names, "rows": found.to_pylist()})
         return
     writer = csv.writer(sys.stdout, lineterminator="\n")

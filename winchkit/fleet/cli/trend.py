@@ -8,11 +8,12 @@ from typing import Any
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_effect, complete_file
+from winchkit.cli.core.completion import complete_effect
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.options import own_effects_option
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.model.options import html_option, json_option, write_page
+from winchkit.cli.model.options import html_option, write_page
 from winchkit.errors import UsageError, suggest
 
 
@@ -43,16 +44,9 @@ from winchkit.errors import UsageError, suggest
     metavar="EFFECT.PARAMETER=VALUE",
     help="Value that must not be reached; a trend towards it has a date.",
 )
-@click.option(
-    "--effects",
-    "effect_files",
-    multiple=True,
-    metavar="FILE",
-    shell_complete=complete_file,
-    help="Your own effects.",
-)
+@own_effects_option()
 @html_option
-@json_option
+@json_flag("Print the answer as JSON.")
 def command(
     *,
     folder: str,
@@ -61,7 +55,6 @@ def command(
     limits: Sequence[str],
     effect_files: Sequence[str],
     html: str | None,
-    as_json: bool,
 ) -> int:
     """Fit one set of effects to every session below DIR, and report what changed and since when.
 
@@ -87,19 +80,16 @@ def command(
     for session, reason in found.failures.items():
         note(f"{session}: {reason}")
     history = found.history
-    if as_json:
-        told: dict[str, Any] = history.to_json()
-        told |= {
-            "effects": list(found.effects),
-            "sessions": found.sessions,
-            "failures": dict(found.failures),
-            "swapped": [vars(swap) for swap in found.swapped],
-        }
-        echo_json(told)
-    else:
-        sessions = f"{found.sessions} session{'' if found.sessions == 1 else 's'}"
-        click.echo(f"{sessions}, effects {', '.join(found.effects)}\n")
-        click.echo(history_text(history, found.swapped))
+    told: dict[str, Any] = {
+        **history.to_json(),
+        "effects": found.effects,
+        "sessions": found.sessions,
+        "failures": found.failures,
+        "swapped": [vars(swap) for swap in found.swapped],
+    }
+    sessions = f"{found.sessions} session{'' if found.sessions == 1 else 's'}"
+    head = f"{sessions}, effects {', '.join(found.effects)}\n"
+    tell(told, [head, history_text(history, found.swapped)])
     if html:
         from winchkit.fleet.report.history import fleet_history_html
 

@@ -54,7 +54,9 @@ def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
         if any(is_written(part) for part in file.files):
             raise RunError(Fault("is being recorded; index again when it ends"))
         run, mapping = _read(file)
-        info = info_of(read_log(run.path)) if mapping is None and _is_mcap(file) else None
+        info = (
+            info_of(read_log(run.path)) if mapping is None and file.path.endswith(".mcap") else None
+        )
     except FileError as error:
         return [own | _faulty(file, digest, str(error.faults[0]))]
     if sum(part.stat().st_size for part in file.files) != file.size:
@@ -210,10 +212,6 @@ def _faulty(file: RunFile, digest: str, fault: str) -> dict[str, Any]:
         "hash": digest,
         "fault": fault,
     }
-
-
-def _is_mcap(file: RunFile) -> bool:
-    return file.path.endswith(".mcap")
 
 
 def _hash(file: RunFile) -> str:

@@ -157,7 +157,7 @@ def _clearance_faults(
     count = ceil(4 * planned.path.length / wiring.clearance) + 1
     places = np.linspace(0.0, planned.path.length, max(count, 2))
     stations = np.unique(np.searchsorted(planned.distance, places).clip(0, len(planned.time) - 1))
-    pose = Pose(planned.pose.position[stations], planned.pose.rotation[stations])
+    pose = planned.pose[stations]
     found = distances(robot, wiring.body, pose, wiring.clearance)
     limit = np.minimum(wiring.clearance, found.distance[0] - _NEARER)
     out = []

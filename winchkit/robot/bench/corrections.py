@@ -121,7 +121,7 @@ class Corrections:
         balanced = np.array([null @ null.T for null in map(null_space, structure)])
         feeds = not self._elongation(angles, planned.force[0]).any()
         path = PathForces(clock, float(planned.time[1]), planned.force, balanced, feeds)
-        start = Pose(planned.pose.position[:1], planned.pose.rotation[:1])
+        start = planned.pose[:1]
         loop = self.force_loop(start, planned.force[0], angles, _ALONG_SPEED, path=path)
         lasts = clock.duration + _ALONG_END
         return self.correction([loop], TRAVEL, _ALONG_SPEED, lambda elapsed, _: elapsed < lasts)

@@ -114,7 +114,7 @@ class Platform(HeldPlatform):
             trims = [CableCorrection(common, i, one.cable) for i, one in enumerate(self._winches)]
         elif mode == "end":
             trims = self._trims(
-                Pose(planned.pose.position[-1:], planned.pose.rotation[-1:]),
+                planned.pose[-1:],
                 planned.force[-1],
                 hold=hold,
             )

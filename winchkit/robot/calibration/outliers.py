@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.identification.bundle_adjustment import (
     BundleState,
     Solution,
@@ -69,7 +68,7 @@ def gross_errors(equations: RobotEquations, values: Array, weights: Weights) -> 
         before, kept = kept, misfit <= np.quantile(misfit, _TRIMMED)
         if np.array_equal(before, kept):
             break
-        pose = Pose(state.pose.position[kept], state.pose.rotation[kept])
+        pose = state.pose[kept]
         fit = solve(equations.of(kept), BundleState(state.values, pose), weights)
         state = place(equations, BundleState(fit.state.values, state.pose), weights)
         weights = _robust_weights(equations, state)

@@ -80,7 +80,7 @@ def next_poses(found: Calibrated, count: int) -> list[NextPose]:
 
     def add(index: int, gain: float) -> bool:
         nonlocal matrix
-        at = Pose(candidates.position[[index]], candidates.rotation[[index]])
+        at = candidates[[index]]
         if not is_held(geometry, platform, at)[0]:
             return False
         matrix = matrix + parts[index].T @ parts[index]
@@ -110,7 +110,7 @@ def _candidates(found: Calibrated) -> Pose:
     length = lengths(geometry, pose.position, pose.rotation)
     rest = forward(geometry, length, pose, found.equations.robot.profile.platform)
     taut = rest.converged & np.all(rest.forces > 0, axis=1)
-    return Pose(rest.pose.position[taut], rest.pose.rotation[taut])
+    return rest.pose[taut]
 
 
 def _information(found: Calibrated, pose: Pose) -> Array:

@@ -113,7 +113,7 @@ def _reading(equations: RobotEquations, values: Array, pose: Pose) -> Pose:
         shift, turn = np.array(tracker.shift), np.array(tracker.turn)
         for run in np.unique(measured.run[which < 0]):
             rows = (which < 0) & (measured.run == run)
-            part = Pose(pose.position[rows], pose.rotation[rows])
+            part = pose[rows]
             seen, angles = measured.position[rows], measured.angles[rows]
             frame = registered(own.trackers[0], part, seen, angles, {"frame"})
             shift[rows], turn[rows] = frame.shift, frame.turn

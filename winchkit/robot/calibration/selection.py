@@ -406,9 +406,7 @@ def _shows_more(first: FitEnd, wider: RobotEquations) -> bool:
     """
     from scipy.special import chdtri
 
-    own = first.equations.instruments or declared_instruments(
-        first.equations.robot, first.equations.measured
-    )
+    own = _instruments(first.equations)
     assert wider.instruments is not None
     free = wider.instruments.free
     if not (own.free < free and len(free) == len(own.free) + 1):

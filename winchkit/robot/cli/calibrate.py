@@ -9,11 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.core.command import Example
-from winchkit.cli.core.completion import complete_bench, complete_effect, complete_sim_bench
+from winchkit.cli.core.completion import complete_effect, complete_sim_bench
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import PROFILE, RUN, output_option
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import QuantityType
+from winchkit.cli.core.options import (
+    PROFILE,
+    RUN,
+    bench_file_option,
+    output_option,
+    quantity_option,
+)
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     ManyValues,
@@ -25,14 +30,13 @@ from winchkit.cli.model.options import (
     write_page,
 )
 from winchkit.errors import UsageError, suggest
-from winchkit.robot.cli.pose_series import pose_names
+from winchkit.robot.cli.pose_series import PoseSeries, pose_names
 
 if TYPE_CHECKING:
     from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.robot.calibration.calibrate import Calibrated
     from winchkit.robot.calibration.options import Options
     from winchkit.robot.calibration.pose_design import NextPose
-    from winchkit.robot.cli.pose_series import PoseSeries
 
 _NOISE_DIMENSIONS = {
     "closure": "length",
@@ -61,13 +65,7 @@ _NOISE_DIMENSIONS = {
 )
 @click.argument("robot", type=PROFILE)
 @click.argument("runs", nargs=-1, metavar="[RUN...]", type=RUN)
-@click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    help="Let this bench drive to the poses and measure them.",
-)
+@bench_file_option("Let this bench drive to the poses and measure them.")
 @click.option(
     "--sim",
     metavar="NAME",
@@ -88,27 +86,10 @@ _NOISE_DIMENSIONS = {
     show_default=True,
     help="Number of poses for validation only.",
 )
-@click.option(
-    "--box",
-    metavar="LENGTH",
-    type=QuantityType("length", example="75 mm"),
-    default="75 mm",
-    show_default=True,
-    help="Half width of the volume about home.",
-)
-@click.option(
-    "--turn",
-    metavar="ANGLE",
-    type=QuantityType("angle", example="7.5 deg"),
-    default="7.5 deg",
-    show_default=True,
-    help="Largest rotation from home.",
-)
-@click.option(
-    "--accuracy",
-    metavar="LENGTH",
-    type=QuantityType("length", example="1 mm"),
-    help="Add poses until the error is below this.",
+@quantity_option("--box", of="length", default="75 mm", help="Half width of the volume about home.")
+@quantity_option("--turn", of="angle", default="7.5 deg", help="Largest rotation from home.")
+@quantity_option(
+    "--accuracy", of="length", example="1 mm", help="Add poses until the error is below this."
 )
 @click.option(
     "--validate",
@@ -131,17 +112,14 @@ _NOISE_DIMENSIONS = {
     "--noise", "noise", multiple=True, metavar="KIND=VALUE",
     help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
 )  # fmt: skip
-@click.option(
-    "--middle-force",
-    metavar="FORCE",
-    type=QuantityType("force", example="80 N"),
-    help="Cable force kept near, where not measured.",
+@quantity_option(
+    "--middle-force", of="force", example="80 N", help="Cable force kept near, where not measured."
 )
 @click.option(
     "--next", "following", type=click.IntRange(0), default=0, help="Number of poses to propose."
 )
 @click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+@json_flag("Print the answer as JSON.")
 @html_option
 @figures_option
 def command(
@@ -161,7 +139,6 @@ def command(
     middle_force: str | None,
     following: int,
     fit_report: bool,
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -177,10 +154,12 @@ def command(
     With --sim a simulated robot does the same on a simulated clock, as fast as this computer can.
     """
     from winchkit.catalog import find
+    from winchkit.cli.core.quantities import optional, quantity
+    from winchkit.robot.calibration.options import Options
     from winchkit.robot.calibration.pose_design import next_poses
 
     source = find("profiles", robot)
-    options = _options(effects, noise, middle_force)
+    options = Options(tuple(effects), _noise(noise), optional(middle_force, "force"))
     if bool(runs) + bool(bench) + bool(sim) != 1:
         raise UsageError(
             "give the RUNs to fit, or --bench to drive to poses and measure them, or --sim for a "
@@ -188,16 +167,12 @@ def command(
         )
     with progress_bar() as progress:
         if not runs:
-            series = _series(
-                robot,
-                Path(output),
-                options,
-                poses=poses,
-                held_out=held_out,
-                box=box,
-                turn=turn,
-                accuracy=accuracy,
-                progress=progress,
+            from winchkit.robot.bench.self_calibration import PoseVolume
+
+            volume = PoseVolume(quantity(box, "length"), quantity(turn, "angle"))
+            wanted = optional(accuracy, "length")
+            series = PoseSeries(
+                robot, Path(output), poses, held_out, volume, options, wanted, progress
             )
             found = (series.on_bench(bench) if bench else series.simulated(str(sim))).calibrated
             runs = [str(pose_names(Path(output))["fit"])]
@@ -209,8 +184,8 @@ def command(
         click.echo(f"only {len(ahead)} of {following} poses can be held by the cables", err=True)
     if not found.refusal:
         _write(source, found, Path(output), runs)
-    _tell(found, ahead, as_json)
-    if fit_report and not as_json:
+    _tell(found, ahead)
+    if fit_report and not is_json():
         click.echo(f"\n{found.fit_report()}")
     if html:
         from winchkit.robot.report.calibration import calibration_html
@@ -227,41 +202,12 @@ def command(
     suggest_next("diagnose", runs, "-p", output)
 
 
-def _series(
-    robot: str,
-    output: Path,
-    options: Options,
-    *,
-    poses: int,
-    held_out: int,
-    box: str,
-    turn: str,
-    accuracy: str | None,
-    progress: ProgressCallback,
-) -> PoseSeries:
-    from winchkit.cli.core.quantities import optional, quantity
-    from winchkit.robot.bench.self_calibration import PoseVolume
-    from winchkit.robot.cli.pose_series import PoseSeries
-
-    volume = PoseVolume(quantity(box, "length"), quantity(turn, "angle"))
-    wanted = optional(accuracy, "length")
-    return PoseSeries(robot, output, poses, held_out, volume, options, wanted, progress)
-
-
 def _source(robot: str, runs: Sequence[str]) -> str:
     """Profile, runs and version, as the figures name them."""
     from importlib.metadata import version
 
     names = ", ".join(Path(run).name for run in runs)
     return f"profile {robot}; {names}; winchkit {version('winchkit')}"
-
-
-def _options(effects: Sequence[str], noise: Sequence[str], middle_force: str | None) -> Options:
-    from winchkit.cli.core.quantities import optional
-    from winchkit.robot.calibration.options import Options
-
-    middle = optional(middle_force, "force")
-    return Options(tuple(effects), _noise(noise), middle)
 
 
 def _calibrated(
@@ -284,10 +230,10 @@ def _calibrated(
     return calibrate(robot_of(profile), measured, held, options, note)
 
 
-def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
+def _tell(found: Calibrated, ahead: Sequence[NextPose]) -> None:
     from winchkit.robot.calibration.results import calibration_json, calibration_text
 
-    if not as_json:
+    if not is_json():
         click.echo(calibration_text(found, ahead))
         return
     for warning in found.warnings:

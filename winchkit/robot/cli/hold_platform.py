@@ -8,17 +8,18 @@ from typing import Any
 
 import click
 
-from winchkit.cli.bench.holding import hold_on
+from winchkit.cli.bench.holding import hold_on, until_rest
 from winchkit.cli.bench.pose_option import read_pose
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
+    duration_option,
     effects_option,
+    quantity_option,
     take_over_option,
 )
 from winchkit.cli.core.output import json_flag, tell
-from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import MotionError
 from winchkit.schema.programme import ALL
 
@@ -41,34 +42,19 @@ _REHEARSED = 1.0
     help="Forces nearest to it in all cables (600N), or those of cables by name (1=600N,2=500N).",
 )
 @click.option("--pose", metavar="POSE", help="Pose to hold by the tracker, x=0.1m,yaw=2deg.")
-@click.option(
-    "--for",
-    "duration",
-    metavar="TIME",
-    type=QuantityType("time", example="5 s"),
-    help="Stop after this time.  [default: until Ctrl-C]",
-)
-@click.option(
+@duration_option("Stop after this time.  [default: until Ctrl-C]", "5 s")
+@quantity_option(
     "--travel",
-    metavar="LENGTH",
-    type=QuantityType("length", example="10 mm"),
+    of="length",
     default="10 mm",
-    show_default=True,
     help="Of each cable either way from its place at the start; the bench trips where it is used "
     "up.",
 )
-@click.option(
-    "--speed",
-    metavar="SPEED",
-    type=QuantityType("speed", example="50 mm/s"),
-    default="50 mm/s",
-    show_default=True,
-    help="Largest speed of a cable.",
-)
-@click.option(
+@quantity_option("--speed", of="speed", default="50 mm/s", help="Largest speed of a cable.")
+@quantity_option(
     "--axial-stiffness",
-    metavar="FORCE",
-    type=QuantityType("force", example="200 kN"),
+    of="force",
+    example="200 kN",
     help="Of the cables, EA.  [default: by the profile]",
 )
 @take_over_option
@@ -96,7 +82,7 @@ def command(
     come to rest within 0.2 s of the end of this command. Exit code 5 where a force is more than 1 %
     of the mean force from the set-point at the end of --for.
     """
-    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+    from winchkit.bench.control.dead_man import DEAD_MAN
     from winchkit.cli.core.dry_run import station_for
     from winchkit.cli.core.quantities import optional, quantity, seconds
 
@@ -115,8 +101,7 @@ def command(
         hold_on(station, ALL, _REHEARSED if dry_run else math.inf if limit is None else limit)
         held = station.platform_held()
         station.release(ALL)
-        while station.moving(ALL):
-            station.clock.sleep(REFRESH)
+        until_rest(station, ALL)
     if dry_run:
         return
     tell(held, _lines(held, forces))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import Asked, read_all, refuse_options
 from winchkit.errors import UsageError
@@ -29,7 +29,6 @@ def tell_poses(
     asked: Asked,
     output: str | None,
     bench: str | None,
-    as_json: bool,
 ) -> None:
     """Diagnose, then propose poses; raises UsageError for options that mean nothing here."""
     from winchkit.robot.diagnosis.diagnose import diagnose
@@ -57,10 +56,8 @@ def tell_poses(
         note(f"written: {output}, the poses '{best.kind.name}'")
     elif output:
         click.echo(f"nothing written to {output}: no such poses show more", err=True)
-    if as_json:
-        echo_json({**plan.to_json(), "written": output if best is not None else None})
-    else:
-        click.echo(_poses_text(plan))
+    written = output if best is not None else None
+    tell({**plan.to_json(), "written": written}, [_poses_text(plan)])
 
 
 def _poses_text(plan: PosePlan) -> str:

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
-
 from winchkit.cli.core.early_checks import check_folder
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -28,7 +26,6 @@ def run_robot(
     *,
     replace: bool,
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Plan and check a robot programme, and run it unless this is a dry run."""
     from winchkit.schema.read import read_bench
@@ -40,28 +37,24 @@ def run_robot(
             "table [robot] (docs/formats.md)"
         )
     if dry_run:
-        _tell_plan(programme, spec, as_json=as_json)
+        _tell_plan(programme, spec)
         return
     check_folder(folder)
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.identity import client_name
     from winchkit.robot.bench.programme import run_robot_programme
 
-    def tell(repeat: int, number: int) -> None:
+    def report(repeat: int, number: int) -> None:
         note(f"{programme.name} {repeat}/{programme.repeat}, motion {number}")
 
     with open_bench(bench, effects=effects, name=client_name("run"), realtime="try") as opened:
         written = run_robot_programme(
-            opened, programme, folder, suffix=suffix, progress=tell, replace_files=replace
+            opened, programme, folder, suffix=suffix, progress=report, replace_files=replace
         )
-    if as_json:
-        echo_json({"schema": 1, "programme": programme.name, "runs": written})
-    else:
-        for path in written:
-            click.echo(path)
+    tell({"programme": programme.name, "runs": written}, map(str, written))
 
 
-def _tell_plan(programme: RobotProgramme, spec: BenchSpec, *, as_json: bool) -> None:
+def _tell_plan(programme: RobotProgramme, spec: BenchSpec) -> None:
     """Plan from the home pose without a bench."""
     from winchkit.robot.bench.planner import Planner
     from winchkit.robot.bench.programme import planned_motions
@@ -69,14 +62,12 @@ def _tell_plan(programme: RobotProgramme, spec: BenchSpec, *, as_json: bool) -> 
     planner = Planner.of(spec)
     motions, _ = planned_motions(planner, programme, planner.robot.home)
     summary = _summary(motions)
-    if as_json:
-        echo_json({"schema": 1, "programme": programme.name, **summary})
-        return
-    click.echo(
+    line = (
         f"{programme.name}: {summary['length']:.3f} m of path in {summary['duration']:.1f} s from "
         f"the home pose; cable forces {summary['least_force']:.0f} N to "
         f"{summary['greatest_force']:.0f} N; nothing was moved"
     )
+    tell({"programme": programme.name, **summary}, [line])
 
 
 def _summary(motions: Motions) -> dict[str, float]:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.completion import complete_bench
-from winchkit.cli.core.options import PROFILE, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.options import PROFILE, bench_file_option, output_option, quantity_option
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError
 
@@ -33,44 +32,39 @@ _SLICES = 12
     ),
 )
 @click.argument("robot", required=False, type=PROFILE)
-@click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    help="Take robot, limits and bodies of a bench file.",
-)
+@bench_file_option("Take robot, limits and bodies of a bench file.")
 @click.option(
     "--tension", nargs=2, type=_FORCE, metavar="LOW HIGH", help="Limits of the cable forces."
 )
 @click.option("--force", type=_FORCE, help="Further force on the platform, in any direction.")
-@click.option(
+@quantity_option(
     "--moment",
-    type=QuantityType("torque", example="2 N m"),
+    of="torque",
+    example="2 N m",
     help="Further moment about its origin, in any direction.",
 )
 @click.option("--cable-speed", type=_SPEED, help="Limit of the speed of every cable.")
 @click.option("--speed", type=_SPEED, help="Speed of the platform, in any direction.")
-@click.option(
+@quantity_option(
     "--rotation-speed",
-    type=QuantityType("angular speed", example="20 deg/s"),
+    of="angular speed",
+    example="20 deg/s",
     help="Speed of its rotation, about any axis.",
 )
-@click.option(
+@quantity_option(
     "--turn",
-    type=QuantityType("angle", example="10 deg"),
+    of="angle",
+    example="10 deg",
     help="Ask also for rotations by this about each axis, both ways.",
 )
-@click.option(
-    "--step",
-    type=QuantityType("length", example="50 mm"),
-    help="Edge of a cell.  [default: a fortieth of the box]",
+@quantity_option(
+    "--step", of="length", example="50 mm", help="Edge of a cell.  [default: a fortieth of the box]"
 )
 @click.option("--from", "start", metavar="PLACE", help=f"Lowest corner of the box, {_PLACE}.")
 @click.option("--to", "end", metavar="PLACE", help="Highest corner.")
 @click.option("--of", "condition", metavar="CONDITION", help="Condition of the mesh.")
 @output_option("Write the surface (.ply, .obj) or every cell (.csv).")
-@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON, in SI units.")
+@json_flag("Print the answer as JSON, in SI units.")
 def command(
     robot: str | None,
     bench: str | None,
@@ -86,8 +80,6 @@ def command(
     end: str | None,
     condition: str | None,
     output: str | None,
-    *,
-    as_json: bool,
 ) -> None:
     """Compute the workspace of ROBOT, a profile, on a grid of positions.
 
@@ -120,10 +112,7 @@ def command(
     chosen = condition or next(iter(found.levels))
     if chosen not in found.levels:
         raise UsageError(f"--of '{chosen}': the conditions here are {', '.join(found.levels)}")
-    if as_json:
-        echo_json({"schema": 1, "robot": model.profile.name, **_figures(found)})
-    else:
-        click.echo(_text(model, found, demand))
+    tell({"robot": model.profile.name, **_figures(found)}, [_text(model, found, demand)])
     if output:
         _write(found, chosen, Path(output))
 

@@ -9,8 +9,7 @@ from typing import ClassVar
 from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import Addition, FittedAddition, Removal
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.regression.intervals import estimates
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -18,8 +17,7 @@ from winchkit.effects.placement import at_line
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
 from winchkit.robot.diagnosis.candidates import lacking, with_needs_met
-from winchkit.robot.diagnosis.engine import PoseSelection
-from winchkit.robot.diagnosis.errors import Errors, FittedModel, errors_of, output_fits_of
+from winchkit.robot.diagnosis.errors import Errors, FittedModel, output_fits_of
 from winchkit.robot.diagnosis.preparation import Preparation, prepare_selection
 from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.effects.bind import declared_terms, robot_terms
@@ -90,27 +88,22 @@ def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
     final: Fit = engine.trial(initial_model, scores[0], noise).fit
-    outputs, found = _outputs_and_values(preparation, engine, initial_model, final, noise)
+    before, after = (FittedModel(engine.regression, f, noise) for f in (initial_model, final))
+    outputs, found = _outputs_and_values(preparation, before, after)
     own = {
         term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
     }
     # Effects of a line's winch are refitted too and stay in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
-    regression = engine.regression
-    was, now = (
-        errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
-    )
     addition = Addition(outputs, terms, preparation.dataset.notes)
-    return FittedRobotAddition(regression, addition, (was, now))
+    return FittedRobotAddition(engine.regression, addition, (before.errors, after.errors))
 
 
 def _outputs_and_values(
-    preparation: Preparation, engine: PoseSelection, first: Fit, final: Fit, noise: BandNoise
+    preparation: Preparation, before: FittedModel, after: FittedModel
 ) -> tuple[dict[str, OutputFit], list[tuple[Term, dict[str, Estimate]]]]:
     """Errors of every output before and after, and the effects with their estimates."""
-    regression = engine.regression
-    before, after = (FittedModel(regression, f, noise, regression.groups) for f in (first, final))
-    found = estimates(regression, final, spread_of(regression, final, noise, regression.blocks))
+    found = estimates(after.regression, after.fit, after.spread)
     return output_fits_of(before, after, preparation.noise), found
 
 
@@ -143,7 +136,8 @@ def remove(
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
     final, _ = engine.fit_with_noise(hypothesis)
-    outputs, found = _outputs_and_values(preparation, engine, initial_model, final, noise)
+    before, after = (FittedModel(engine.regression, f, noise) for f in (initial_model, final))
+    outputs, found = _outputs_and_values(preparation, before, after)
     # Effects of a line's winch are refitted too and stay in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
     return Removal(effect_id, outputs, left, preparation.dataset.notes)

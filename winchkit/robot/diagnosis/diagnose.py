@@ -17,7 +17,7 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.cross_validation import AT_NOISE
 from winchkit.diagnosis.regression.gls import fit
-from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.intervals import estimates
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
 from winchkit.diagnosis.results import (
@@ -57,7 +57,6 @@ from winchkit.robot.diagnosis.errors import (
     FittedModel,
     column_names,
     errors_in_noise,
-    errors_of,
     output_fits_in_noise,
     output_fits_of,
     refuted_outputs,
@@ -176,10 +175,8 @@ class RobotSelection:
     @cached_property
     def refitted(self) -> tuple[Step, ...]:
         """Effects of the profile whose file values predict worse than fitted ones."""
-        final = self.final
-        spread = spread_of(final.regression, final.fit, final.noise, final.regression.blocks)
         file = own_effects(self.preparation.of_file)
-        steps = refitted_steps(self.engine, self.result, file, self.in_noise, spread)
+        steps = refitted_steps(self.engine, self.result, file, self.in_noise, self.final.spread)
         return tuple(map(plain_step, steps)) if file.terms else ()
 
     @property
@@ -196,24 +193,17 @@ class RobotSelection:
         for index, term in enumerate(self.preparation.of_file):
             start = start.with_term_at(index, held(term))
         first, noise = self.file_engine.fit_with_noise(start)
-        return FittedModel(
-            self.file_engine.regression, first, noise, self.file_engine.regression.groups
-        )
+        return FittedModel(self.file_engine.regression, first, noise)
 
     @cached_property
     def final(self) -> FittedModel:
         """The model with all named effects."""
-        result, engine = self.result, self.engine
-        return FittedModel(engine.regression, result.final, result.noise, engine.regression.groups)
+        return FittedModel(self.engine.regression, self.result.final, self.result.noise)
 
-    @cached_property
+    @property
     def errors(self) -> tuple[Errors, Errors]:
         """Errors of both models at every pose, SI."""
-        initial_model, final = (
-            errors_of(s.regression, s.regression.at(s.fit.hypothesis))
-            for s in (self.initial_model, self.final)
-        )
-        return initial_model, final
+        return self.initial_model.errors, self.final.errors
 
     @property
     def rest(self) -> tuple[PoseRegression, Errors]:
@@ -270,7 +260,7 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
             result.initial_model,
             result.final,
             result.noise,
-            spread_of(engine.regression, result.final, result.noise, engine.regression.blocks),
+            selection.final.spread,
         ),
         traces=_traces(selection, named=bool(steps)),
     )
@@ -314,8 +304,7 @@ def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
 def _registered_steps(selection: RobotSelection) -> Iterator[Step]:
     """Effects of the tracker that were registered before the selection, as additions."""
     final, found = selection.final, selection.preparation.found
-    spread = spread_of(final.regression, final.fit, final.noise, final.regression.blocks)
-    own = estimates(final.regression, final.fit, spread)
+    own = estimates(final.regression, final.fit, final.spread)
     gain = _gain(selection.outputs)
     for index in found:
         term, values = own[index]
@@ -343,7 +332,6 @@ def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
         return
     final, regression = selection.final, selection.engine.regression
     geometry, parameters = regression.point.geometry, regression.equations.parameters
-    std = spread_of(regression, final.fit, final.noise, regression.blocks).std
     first = regression.nuisance_columns.shape[1] - len(geometry)
     values: dict[str, dict[str, Estimate]] = {}
     for column, number in enumerate(geometry, start=first):
@@ -351,13 +339,13 @@ def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
         change = (regression.point.state.values - parameters.nominal)[number.index]
         value = float(change) + float(final.fit.vector[column]) * prior
         own = values.setdefault(number.effect, {})
-        own[number.parameter] = Estimate(value, float(std[column]) * prior, "m")
+        own[number.parameter] = Estimate(value, float(final.spread.std[column]) * prior, "m")
     present = {name.partition("/")[0] for name in values}
     effects = tuple(name for name in GEOMETRY if name in present)
     of_file = selection.file_engine.regression
     beside = replace(final.fit.hypothesis, nuisances=())
     refitted = fit(of_file, beside, final.noise.inverse_sigma(of_file))
-    without = replace(final, regression=of_file, fit=refitted, folds=of_file.groups)
+    without = replace(final, regression=of_file, fit=refitted)
     standing = _standing(selection, without, tuple(selection.in_noise))
     yield Step(
         effects,

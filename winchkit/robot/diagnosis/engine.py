@@ -53,7 +53,7 @@ class PoseSelection(SelectionEngine):
 
     def held_out_errors(self, fitted: Fit, noise: BandNoise, folds: Folds) -> dict[str, float]:
         """Held-out rms error of cable lengths, platform position and tensions, SI."""
-        return held_out_rms(FittedModel(self.regression, fitted, noise, folds))
+        return held_out_rms(FittedModel(self.regression, fitted, noise))
 
     def _choose_folds(self, fitted: Fit, noise: BandNoise) -> Folds:
         """Groups of poses: every unknown is common to all of them."""

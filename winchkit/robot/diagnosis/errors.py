@@ -11,15 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import held_out_rms as held_out_rows
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import OutputFit
 from winchkit.model.rotation import rotation_by, skew
@@ -37,12 +38,21 @@ numerical."""
 
 @dataclass(frozen=True)
 class FittedModel:
-    """Fitted model with the noise and the folds by which it is judged."""
+    """Fitted model with the noise by which it is judged."""
 
     regression: PoseRegression
     fit: Fit
     noise: BandNoise
-    folds: Folds
+
+    @cached_property
+    def errors(self) -> Errors:
+        """Errors of every pose, SI."""
+        return errors_of(self.regression, self.regression.at(self.fit.hypothesis))
+
+    @cached_property
+    def spread(self) -> Spread:
+        """Standard deviations and intervals of the unknowns."""
+        return spread_of(self.regression, self.fit, self.noise, self.regression.blocks)
 
 
 def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
@@ -144,9 +154,7 @@ def output_fits_of(
     begin: FittedModel, final: FittedModel, noise: PoseNoise
 ) -> dict[str, OutputFit]:
     """Error statistics of every output before and after; of positions those of the distance."""
-    before, after = (
-        errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
-    )
+    before, after = begin.errors, final.errors
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
     least = noise_rms(final.regression, replace(noise, sigma=noise.least))
     signal = signal_rms(final.regression)
@@ -175,7 +183,7 @@ def errors_in_noise(model: FittedModel) -> dict[str, float]:
     Every measured coordinate has the weight of its variance component: in an error in metres the
     least accurate angle hides what a tracker sees.
     """
-    return held_out_rows(model.regression, model.fit, model.noise, model.folds)
+    return held_out_rows(model.regression, model.fit, model.noise, model.regression.groups)
 
 
 def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
@@ -272,8 +280,8 @@ def _held_out(model: FittedModel) -> Errors:
     """Errors of every pose with the parameters fitted without its fold (linearised), SI."""
     regression, found = model.regression, model.fit
     here = regression.at(found.hypothesis)
-    steps = left_out_steps(regression, found, model.noise, model.folds)
-    of_pose = regression.fold_of_pose(model.folds)
+    steps = left_out_steps(regression, found, model.noise, regression.groups)
+    of_pose = regression.fold_of_pose(regression.groups)
     out = {kind: values.copy() for kind, values in here.items()}
     for index in range(len(found.vector)):
         step = 1e-3 * max(1.0, abs(found.vector[index]))

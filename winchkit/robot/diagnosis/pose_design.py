@@ -98,7 +98,7 @@ def simulated_poses(
     good = is_held(robot.geometry, robot.platform, pose)
     if regression.dataset.has_tension:
         good &= np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
-    pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
+    pose, force = pose[good], force[good]
     so_far = regression.dataset.measured
     warm = np.nanmean(np.where(np.isfinite(so_far.temperature), so_far.temperature, 20.0))
     warmth = np.full(force.shape, warm)
@@ -221,7 +221,7 @@ def pose_offers(
         own = slice(begin, begin + len(measured))
         begin = own.stop
         chosen, noncentralities = _chosen([part[own] for part in parts], base, required, count)
-        at = Pose(pose.position[chosen], pose.rotation[chosen])
+        at = pose[chosen]
         powers = _powers(noncentralities, required)
         out.append(
             PoseOffer(

@@ -92,7 +92,9 @@ def registration_of(
     if declared:
         start = registered(start, pose, measured.position, measured.angles, declared)
     free = frozenset(
-        name for name in ("frame", "reflector") if name not in declared and _may_move(name, names)
+        name
+        for name in ("frame", "reflector")
+        if name not in declared and _EFFECTS[name] not in names
     )
     before = _error(start, pose, measured.position)
     found: frozenset[str] = frozenset()
@@ -135,10 +137,6 @@ def datum_notes(effects: Container[str]) -> list[str]:
         for effect, same in _SAME_AS.items()
         if effect in effects
     ]
-
-
-def _may_move(name: str, own: set[str]) -> bool:
-    return _EFFECTS[name] not in own
 
 
 def _predicted(dataset: RobotDataset, robot: Robot) -> Pose:

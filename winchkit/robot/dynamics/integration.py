@@ -89,36 +89,14 @@ def integrate(
     time: Array,
     tolerance: float = 1e-8,
 ) -> SimulatedPlatform:
-    """Integrate the platform's motion.
+    """Integrate the platform's motion; the result has the k instants of ``time``.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    platform : PlatformSpec
-        With mass and moment of inertia.
-    cables : ElasticCables
-        Stiffness and damping.
-    start : tuple of Pose and (6,) array
-        One pose, and its velocity: of the origin, m/s, and angular, rad/s, base axes.
-    unstrained : callable
-        Lengths (n,) without force at a time, m: of a robot ``robot.lengths_at(angles)[0]``.
-    rate : callable, optional
-        Their derivatives (n,) by time, m/s, which the damping needs; None for winches at rest.
-    time : (k,) array
-        Instants to report, increasing from the start's, s.
-    tolerance : float
-        Relative error of a step; absolute in m, rad, m/s and rad/s.
-
-    Returns
-    -------
-    Simulated
-        At the k instants.
-
-    Raises
-    ------
-    UsageError
-        Without mass or moment of inertia, or where the integration does not reach the end.
+    ``start``: one pose, and its velocity (6,): of the origin, m/s, and angular, rad/s, base axes.
+    ``unstrained``: lengths (n,) without force at a time, m: of a robot
+    ``robot.lengths_at(angles)[0]``. ``rate``: their derivatives (n,) by time, m/s, which the
+    damping needs; None for winches at rest. ``time`` (k,): increasing from the start's, s.
+    ``tolerance``: relative error of a step; absolute in m, rad, m/s and rad/s. Raises UsageError
+    without mass or moment of inertia, or where the integration does not reach the end.
     """
     from scipy.integrate import solve_ivp
 

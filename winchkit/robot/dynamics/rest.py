@@ -118,7 +118,7 @@ def _step(robot: Robot, pose: Pose, force: Array, weight: float) -> tuple[Array,
     count = force.shape[1]
     left, step = np.full(len(force), np.inf), np.full((len(force), 3 + count), np.nan)
     good = np.isfinite(lengths(robot.geometry, pose.position, pose.rotation)).all(axis=1)
-    at, force = Pose(pose.position[good], pose.rotation[good]), force[good]
+    at, force = pose[good], force[good]
     scale = _scale(robot) / weight
     slope, bend = _linear(robot, at, force)
     turned = np.swapaxes(slope, 1, 2)

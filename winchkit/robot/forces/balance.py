@@ -1,8 +1,8 @@
 """Balance of cable forces and weight at the platform, as constraint equations of its poses.
 
-``balance`` (IPAnema paper, Eq. 7). The wrench Aᵀ f + w of measured cable forces f and weight w,
-multiplied by a matrix V with V Aᵀ A Vᵀ = 1, so that each row has the variance of one force reading.
-With the mass m and the centre of mass s of the platform
+``force_basis`` whitens the balance (IPAnema paper, Eq. 7): the wrench Aᵀ f + w of measured cable
+forces f and weight w is multiplied by a matrix V with V Aᵀ A Vᵀ = 1, so that each row has the
+variance of one force reading. With the mass m and the centre of mass s of the platform
 
     ∂w/∂m = [g; (R s) × g]                   ∂w/∂s_k = [0; R e_k × m g]
 
@@ -45,29 +45,6 @@ _STEP = 1e-6
 below 1e-9 of a force. Also the least lever arm of a platform's anchor points, m."""
 
 
-def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec) -> Constraint:
-    """Whitened wrench of measured cable forces and weight, (p, 6), N.
-
-    V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
-    is missing or the cables do not hold all degrees of freedom.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
-    forces, N. Returns: ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and
-    ``tension``: by cable forces, (p, 6, n).
-    """
-    structure = structure_matrix(geometry, pose.position, pose.rotation)
-    spread = structure @ np.swapaxes(structure, 1, 2) + np.diag(1 - geometry.free)
-    whiten = np.full_like(spread, np.nan)
-    good = np.all(np.isfinite(spread), axis=(1, 2))
-    good &= np.linalg.matrix_rank(structure) == geometry.degrees
-    whiten[good] = np.linalg.inv(np.linalg.cholesky(spread[good]))
-    left = wrench_residual(structure, tension, gravity_wrench(platform, pose.rotation))
-    residual = (whiten @ left[..., None])[..., 0]
-    by_payload = whiten @ weight_by_payload(platform, pose.rotation)
-    by = {"payload": by_payload, "tension": whiten @ structure}
-    return Constraint(residual, np.zeros((*residual.shape, 6)), {}, by)
-
-
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
     """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
 
@@ -81,10 +58,9 @@ def force_basis(structure: Array) -> tuple[Array, Array]:
     """Matrices from a wrench to whitened forces, and from these to cable forces.
 
     ``structure`` (p, 6, n): structure matrices Aᵀ = U S Wᵀ (singular value decomposition). Returns:
-    ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from
-    which it differs by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench,
-    so that hanging and guided platforms keep the rows that they do carry. ``to_cables``
-    (p, n, k): W: the least change of cable forces that carries each of these forces.
+    ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n). A row is NaN where the cables cannot
+    carry its wrench, so that hanging and guided platforms keep the rows that they do carry.
+    ``to_cables`` (p, n, k): W: the least change of cable forces that carries each of these forces.
     """
     good = np.all(np.isfinite(structure), axis=(1, 2))
     left, size, right = np.linalg.svd(

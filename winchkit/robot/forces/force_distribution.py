@@ -197,19 +197,9 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
 def preloaded(structure: Array, wrench: Array, limits: ForceLimits, preload: Array) -> Forces:
     """Solution with wanted forces in some cables, changed least from :func:`quadratic`.
 
-    Other parameters as of :func:`closed_form`.
-
-    Parameters
-    ----------
-    preload : (n,) array
-        Wanted forces, N; NaN in the other cables. More than balance each other are met with the
-        least sum of squares.
-
-    Returns
-    -------
-    Forces
-        Also where they are beyond the limits; NaN where no forces within the limits balance the
-        wrench.
+    ``preload`` (n,): wanted forces, N; NaN in the other cables. More than balance each other are
+    met with the least sum of squares. Returns: also forces beyond the limits; NaN where none within
+    the limits balance the wrench. Other parameters as of :func:`closed_form`.
 
     Notes
     -----

@@ -168,7 +168,7 @@ def forward(
     at_rest = _PoseSearch(geometry, given, platform if hanging else None).run(begin, steps)
     best, other = at_rest.best, _Candidates.none(many)
     if hanging and len(rows := np.flatnonzero(~np.isfinite(best.worst))):
-        at = Pose(begin.position[rows], begin.rotation[rows])
+        at = begin[rows]
         again = _PoseSearch(geometry, given[rows], platform, _WEAK).run(at, steps)
         best.put(rows, again.best, np.ones(len(rows), dtype=bool))
         at_rest.forces[rows] = again.forces
@@ -259,7 +259,7 @@ def _search_further(
 ) -> None:
     """Search some poses from other starts; changes the best candidate and the second one."""
     best, other = found
-    begin = Pose(start.position[rows], start.rotation[rows])
+    begin = start[rows]
     starts = _starts(geometry, given[rows], begin)
     left, tried, most = np.arange(len(rows)), 0, starts.position.shape[1]
     while tried < most and len(left := left[~(best.worst[rows[left]] <= search)]):
@@ -274,7 +274,7 @@ def _search_further(
         ends = _PoseSearch(geometry, pulled, None).run(at, _EARLY * len(_LONGEST)).best
         for number in range(count):
             new = ends.of(np.arange(number, len(left) * count, count))
-            new.apart[:] = distance(new.pose, Pose(begin.position[left], begin.rotation[left]))
+            new.apart[:] = distance(new.pose, begin[left])
             _admit(new, best, other, rows[left])
 
 
@@ -426,7 +426,7 @@ class _PoseSearch:
         slope, missing = np.concatenate([by.position, by.rotation], axis=-1), given - length
         good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
         step, forces = np.full((len(given), 6), np.nan), np.full_like(given, np.nan)
-        there = Pose(at.position[good], at.rotation[good])
+        there = at[good]
         if self.platform is not None:
             held = np.where(taut, missing, 0.0)[good]
             slope = np.where(taut[..., None], slope, 0.0)[good]

@@ -13,9 +13,10 @@ the exit point is fixed. All is in SI and in batches of p poses of a robot with 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
@@ -66,6 +67,10 @@ class Pose:
     """Of the platform frame's origin in the base frame, (p, 3), m."""
     rotation: Array
     """Platform to base, (p, 3, 3)."""
+
+    def __getitem__(self, rows: slice | NDArray[Any] | list[int]) -> Pose:
+        """Some of the poses, by a slice, a mask or indices."""
+        return Pose(self.position[rows], self.rotation[rows])
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,7 @@ def registered(
     """
     known = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(pose.position), axis=1)
     if np.count_nonzero(known) >= 4:
-        start = _located(start, Pose(pose.position[known], pose.rotation[known]), seen[known], free)
+        start = _located(start, pose[known], seen[known], free)
     if "mounting" in free:
         start = _mounted(start, pose, angles)
     return start
@@ -272,7 +272,7 @@ def _mounted(start: Tracker, pose: Pose, angles: Array) -> Tracker:
     if not np.any(whole):
         return start
     bare = replace(start, mounting=None)
-    shown = reading_of(bare, Pose(pose.position[whole], pose.rotation[whole])).rotation
+    shown = reading_of(bare, pose[whole]).rotation
     turned = mean_rotation(np.swapaxes(shown, 1, 2) @ rotation_of(*angles[whole].T))
     return replace(start, mounting=rotation_vector(turned))
 

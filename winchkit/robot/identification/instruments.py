@@ -141,7 +141,7 @@ def _registered(
     rows = which == largest
     whole = registered(
         first,
-        Pose(predicted.position[rows], predicted.rotation[rows]),
+        predicted[rows],
         measured.position[rows],
         measured.angles[rows],
         free,
@@ -151,7 +151,7 @@ def _registered(
     trackers = []
     for number in range(len(instruments.sessions)):
         rows = which == number
-        own = Pose(predicted.position[rows], predicted.rotation[rows])
+        own = predicted[rows]
         trackers.append(
             registered(whole, own, measured.position[rows], measured.angles[rows], free & {"frame"})
         )

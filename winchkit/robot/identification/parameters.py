@@ -19,7 +19,7 @@ from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.instruments import LARGEST_SCALE, InstrumentValues
 from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
-from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
+from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 from winchkit.units import dimension_of, parse
 
 HOME_LENGTH = "home-length"
@@ -51,7 +51,7 @@ def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
                 found = {name: value + before[name] for name, value in found.items()}
             out[table.id] = found
         except UsageError as error:
-            faults.append(_fault(table, str(error)))
+            faults.append(Fault(str(error), table.path, table.line, f"effect {table.id}"))
     if faults:
         raise FileError(faults)
     return out
@@ -66,10 +66,6 @@ def _values(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, flo
             except UsageError as error:
                 raise UsageError(f"{name}: {error}") from error
     return out
-
-
-def _fault(table: EffectTable, message: str) -> Fault:
-    return Fault(message, table.path, table.line, f"effect {table.id}")
 
 
 @dataclass(frozen=True)

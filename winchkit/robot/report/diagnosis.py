@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite, nan, sqrt
 from typing import Literal
 
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.results import OutputError, OutputFit
 from winchkit.profile_edit.naming import extended_name
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import AxisLabel, reading
@@ -43,44 +45,62 @@ _FEW_POSES = 400
 """Poses up to which a point is large."""
 
 
-def pose_figures(
-    regression: PoseRegression,
-    before: Errors,
-    after: Errors | None,
-    noise: Mapping[str, float | None],
-    *,
-    order: Sequence[str] = (),
-    changed: str = "with the effect",
-    source: str = "",
-) -> dict[str, Figure]:
-    """Errors of every output over their main variable, in the given order.
+@dataclass(frozen=True)
+class _PoseReport:
+    """Errors of the poses by a model and by a changed one, as a page shows them."""
 
-    ``after`` is None where nothing was changed.
-    """
-    drawn = {trace.over.output: trace for trace in traces(regression, before, after)}
-    ordered = [name for name in dict.fromkeys((*order, *drawn)) if name in drawn]
-    return {
-        name: replace(_figure(drawn[name], noise.get(name), changed), source=source)
-        for name in ordered
-    }
+    regression: PoseRegression
+    outputs: Mapping[str, OutputFit] | Mapping[str, OutputError]
+    before: Errors
+    after: Errors | None
+    """None where nothing was changed."""
+    changed: str
+    """Name of the changed model."""
+    source: str
 
+    @cached_property
+    def drawn(self) -> dict[str, Figure]:
+        """Errors of every output over their main variable, the worst first."""
+        found = {t.over.output: t for t in traces(self.regression, self.before, self.after)}
+        ordered = dict.fromkeys((*worst_outputs(self.outputs), *found))
+        noise = {name: output.noise_rms for name, output in self.outputs.items()}
+        return {
+            name: replace(_figure(found[name], noise.get(name), self.changed), source=self.source)
+            for name in ordered
+            if name in found
+        }
 
-def _cards(
-    regression: PoseRegression,
-    figures: Mapping[str, Figure],
-    before: Errors,
-    after: Errors | None,
-    sizes: Mapping[str, str],
-) -> list[Markup]:
-    """A card per output: its figure, and its error by line or axis."""
-    cards = []
-    for number, (name, figure) in enumerate(figures.items()):
-        lines = list(AXES) if name == "platform_position" else list(regression.dataset.names)
-        then = None if after is None else on_cables(regression, {name: after[name]})[name]
-        each = _each_line(name, lines, on_cables(regression, {name: before[name]})[name], then)
-        pair = element("div", figure_block(figure), element("div", each), class_="pair")
-        cards.append(output_card(name, [pair], sizes, opened=number == 0))
-    return cards
+    @cached_property
+    def ladder(self) -> Figure | None:
+        """Errors over the noise; None where no noise is known."""
+        return error_ladder(
+            self.outputs,
+            extended=self.after is not None,
+            changed=self.changed,
+            source=self.source,
+        )
+
+    @property
+    def figures(self) -> list[Figure]:
+        """The ladder, where there is one, then the errors."""
+        return [*present(self.ladder), *self.drawn.values()]
+
+    def cards(self) -> list[Markup]:
+        """A card per output: its figure, and its error by line or axis."""
+        cards, sizes = [], size_texts(self.outputs)
+        for number, (name, figure) in enumerate(self.drawn.items()):
+            before = self._on_cables(name, self.before)
+            after = None if self.after is None else self._on_cables(name, self.after)
+            each = _each_line(name, self._lines(name), before, after)
+            pair = element("div", figure_block(figure), element("div", each), class_="pair")
+            cards.append(output_card(name, [pair], sizes, opened=number == 0))
+        return cards
+
+    def _on_cables(self, output: str, errors: Errors) -> Array:
+        return on_cables(self.regression, {output: errors[output]})[output]
+
+    def _lines(self, output: str) -> Sequence[str]:
+        return AXES if output == "platform_position" else self.regression.dataset.names
 
 
 def _figure(trace: PoseErrorTrace, noise: float | None, changed: str) -> Figure:
@@ -191,96 +211,77 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if known.size else nan
 
 
+def _of_answer(answer: RobotAnswer, source: str) -> _PoseReport:
+    selection, steps = answer.selection, answer.diagnosis.steps
+    before, after = selection.errors
+    changed = f"with {steps[0].effects[0]}" if len(steps) == 1 else f"with {len(steps)} effects"
+    if steps and steps[0].whole:
+        changed = "calibrated"
+    return _PoseReport(
+        selection.final.regression,
+        answer.diagnosis.outputs,
+        before,
+        after if steps else None,
+        changed,
+        source,
+    )
+
+
 def report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
-    selection, diagnosis = answer.selection, answer.diagnosis
-    command = CommandLine(selection.preparation.dataset, profile, options)
-    drawn = _report_figures(answer, command.source)
-    before, after = selection.errors
-    fitted = after if diagnosis.steps else None
-    regression = selection.final.regression
-    cards = _cards(regression, drawn, before, fitted, size_texts(diagnosis.outputs))
+    command = CommandLine(answer.selection.preparation.dataset, profile, options)
+    shown = _of_answer(answer, command.source)
     patterns = unexplained_figures(answer, command.source)
-    ladder = _report_ladder(answer, command.source)
     content = sections(
-        answer, cards, (), None, command, title=title, unexplained=patterns, ladder=ladder
+        answer,
+        shown.cards(),
+        (),
+        None,
+        command,
+        title=title,
+        unexplained=patterns,
+        ladder=shown.ladder,
     )
-    return page(title, [*present(ladder), *drawn.values(), *patterns], content, headed=False)
+    return page(title, [*shown.figures, *patterns], content, headed=False)
 
 
 def report_figures(answer: RobotAnswer, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's diagnosis."""
-    drawn = _report_figures(answer, source).values()
-    ladder = _report_ladder(answer, source)
-    return [*present(ladder), *drawn, *unexplained_figures(answer, source)]
+    return [*_of_answer(answer, source).figures, *unexplained_figures(answer, source)]
 
 
-def _report_ladder(answer: RobotAnswer, source: str) -> Figure | None:
-    diagnosis = answer.diagnosis
-    return error_ladder(
-        diagnosis.outputs,
-        extended=bool(diagnosis.steps),
-        changed=_changed(answer),
-        source=source,
-    )
-
-
-def _changed(answer: RobotAnswer) -> str:
-    """Name of the changed model."""
-    steps = answer.diagnosis.steps
-    if steps and steps[0].whole:
-        return "calibrated"
-    return f"with {steps[0].effects[0]}" if len(steps) == 1 else f"with {len(steps)} effects"
-
-
-def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
-    diagnosis, selection = answer.diagnosis, answer.selection
-    before, after = selection.errors
-    noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
-    order = worst_outputs(diagnosis.outputs)
-    fitted = after if diagnosis.steps else None
-    return pose_figures(
-        selection.final.regression,
-        before,
-        fitted,
-        noise,
-        order=order,
-        changed=_changed(answer),
-        source=source,
-    )
+def _of_comparison(compared: RobotCompared, source: str) -> _PoseReport:
+    outputs = compared.comparison.outputs
+    return _PoseReport(compared.regression, outputs, compared.errors, None, "", source)
 
 
 def comparison_html(
     compared: RobotCompared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's comparison."""
-    comparison = compared.comparison
     command = CommandLine(compared.regression.dataset, profile, options)
-    drawn = _comparison_figures(compared, command.source)
-    sizes = size_texts(comparison.outputs)
-    ladder = error_ladder(comparison.outputs, source=command.source)
-    cards = _cards(compared.regression, drawn, compared.errors, None, sizes)
+    shown = _of_comparison(compared, command.source)
     content = comparison_sections(
-        comparison, compared.followed, cards, command, title=title, ladder=ladder
+        compared.comparison,
+        compared.followed,
+        shown.cards(),
+        command,
+        title=title,
+        ladder=shown.ladder,
     )
-    return page(title, [*present(ladder), *drawn.values()], content, headed=False)
+    return page(title, shown.figures, content, headed=False)
 
 
 def comparison_figures(compared: RobotCompared, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's comparison."""
-    ladder = error_ladder(compared.comparison.outputs, source=source)
-    return [*present(ladder), *_comparison_figures(compared, source).values()]
+    return _of_comparison(compared, source).figures
 
 
-def _comparison_figures(compared: RobotCompared, source: str) -> dict[str, Figure]:
-    outputs = compared.comparison.outputs
-    noise = {name: error.noise_rms for name, error in outputs.items()}
-    order = worst_outputs(outputs)
-    return pose_figures(
-        compared.regression, compared.errors, None, noise, order=order, source=source
-    )
+def _of_addition(fitted: FittedRobotAddition, source: str) -> _PoseReport:
+    changed = f"with {fitted.addition.added[0].label}"
+    return _PoseReport(fitted.regression, fitted.addition.outputs, *fitted.errors, changed, source)
 
 
 def addition_html(
@@ -293,32 +294,14 @@ def addition_html(
 ) -> str:
     """The page of an effect added to a robot; ``better`` is the profile that was written."""
     command = CommandLine(fitted.regression.dataset, profile, options)
-    drawn = _addition_figures(fitted, command.source)
-    sizes = size_texts(fitted.addition.outputs)
-    cards = _cards(fitted.regression, drawn, *fitted.errors, sizes)
+    shown = _of_addition(fitted, command.source)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
-    ladder = _addition_ladder(fitted, command.source)
-    content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
-    return page(title, [*present(ladder), *drawn.values()], content, headed=False)
+    content = addition_sections(
+        fitted.addition, shown.cards(), command, better, title=title, ladder=shown.ladder
+    )
+    return page(title, shown.figures, content, headed=False)
 
 
 def addition_figures(fitted: FittedRobotAddition, source: str = "") -> list[Figure]:
     """The figures of the page of an effect added to a robot."""
-    ladder = _addition_ladder(fitted, source)
-    return [*present(ladder), *_addition_figures(fitted, source).values()]
-
-
-def _addition_ladder(fitted: FittedRobotAddition, source: str) -> Figure | None:
-    changed = f"with {fitted.addition.added[0].label}"
-    return error_ladder(fitted.addition.outputs, extended=True, changed=changed, source=source)
-
-
-def _addition_figures(fitted: FittedRobotAddition, source: str) -> dict[str, Figure]:
-    outputs = fitted.addition.outputs
-    noise = {name: output.noise_rms for name, output in outputs.items()}
-    before, after = fitted.errors
-    changed = f"with {fitted.addition.added[0].label}"
-    order = worst_outputs(outputs)
-    return pose_figures(
-        fitted.regression, before, after, noise, order=order, changed=changed, source=source
-    )
+    return _of_addition(fitted, source).figures

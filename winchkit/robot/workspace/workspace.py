@@ -234,17 +234,9 @@ def grid_of(
 
 
 def usual_box(robot: Robot) -> tuple[Array, Array]:
-    """Box of the exit points, and of their images in the horizontal plane through home.
+    """Lowest and highest corner (3,) of the exit points, m.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-
-    Returns
-    -------
-    tuple of two (3,) arrays
-        Lowest and highest corner, m. Exit points all above home leave as much room below it.
+    Exit points all above home leave as much room below it.
     """
     exits, home = robot.geometry.exit_point, robot.home.position[0]
     low, high = exits.min(axis=0), exits.max(axis=0)

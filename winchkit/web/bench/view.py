@@ -45,6 +45,7 @@ from winchkit.web.bench.live_model import CHANNELS, LiveModel
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
+from winchkit.web.views import attachment
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -197,8 +198,7 @@ class BenchView:
         if found is None:
             raise UsageError("nothing is tripped: the cycles of a trip are kept until its reset")
         name, text = await asyncio.to_thread(trip_file, found, self.spec.name, self.folder)
-        headers = {"content-disposition": f'attachment; filename="{name}"'}
-        return Response(text, media_type="text/csv", headers=headers)
+        return attachment(text, name, "text/csv")
 
     def _watched(self) -> RemoteStation:
         """The station that watches; raises ConnectionLost where there is none."""
