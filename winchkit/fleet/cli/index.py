@@ -35,6 +35,8 @@ def command(folder: str, profile: str | None, as_json: bool) -> None:
         report = index_library(folder, profile, progress)
     for path, fault in report.faults.items():
         note(fault if path in fault else f"{path}: {fault}")
+    for path in report.removed:
+        note(f"{path}: is no longer there; removed with its diagnosis")
     if as_json:
         echo_json(report.to_json())
         return

@@ -33,7 +33,7 @@ from winchkit.cli.model.options import json_option
 @click.option("--until", metavar="DATE", help="Last UTC day, YYYY-MM-DD.")
 @click.option(
     "--verdict",
-    type=click.Choice(["adequate", "explained", "partly", "unknown"]),
+    type=click.Choice(["adequate", "explained", "partly", "unknown", "undecided"]),
     help="Verdict of the session's diagnosis.",
 )
 @json_option
