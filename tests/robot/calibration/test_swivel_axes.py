@@ -49,10 +49,6 @@ def test_reversed_axes_are_named_and_right_ones_are_not(
         assert f"{', '.join(lines)}; nothing was written" in found.refusal
 
 
-def test_most_axes_reversed_are_named_in_a_known_frame(tmp_path: Path) -> None:
-    assert calibrated(tmp_path, replace(SCENE, seed=5), *ALL[:5]).reversed_axes == ALL[:5]
-
-
 def test_nothing_is_written_with_them(tmp_path: Path) -> None:
     found, out = calibrated(tmp_path, SCENE, *ALL), tmp_path / "new.toml"
     with pytest.raises(UsageError, match="nothing was written"):

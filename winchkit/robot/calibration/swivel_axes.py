@@ -38,9 +38,7 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
         costs = [_cost(best, trial ^ turned) for trial in trials]
         trial = trials[int(np.argmin(costs))]
         found = fitted(_with_axes(best.equations, trial ^ turned), options, progress)
-        # That some are reversed needs evidence; of the sets of lines the best one is named.
-        needed = 0.0 if np.any(turned) else DELTA_CHI_SQUARE
-        if not found.with_prior < best.with_prior - needed:
+        if not found.with_prior < best.with_prior - DELTA_CHI_SQUARE:
             break
         best, turned = found, trial
     return tuple(name for name, own in zip(names, turned, strict=True) if own)
