@@ -66,6 +66,14 @@ def test_a_mistyped_profile_is_no_exchange() -> None:
     assert swapped_profiles(identified, dict.fromkeys("ABC", np.array([[1e-6]])), profiles) == ()
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-4])
+def test_winches_with_equal_profiles_are_no_exchange(apart: float) -> None:
+    # A and B have one drum, mistyped by ten standard deviations in the profile of either.
+    identified = {"A": np.array([0.11]), "B": np.array([0.09]), "C": np.array([0.15])}
+    profiles = {"A": np.array([0.1]), "B": np.array([0.1 + apart]), "C": np.array([0.15])}
+    assert swapped_profiles(identified, dict.fromkeys("ABC", np.array([[1e-6]])), profiles) == ()
+
+
 def test_the_p_value_of_two_winches_is_the_closed_form() -> None:
     identified = {"A": np.array([2.0]), "B": np.array([0.0])}
     profiles = {"A": np.array([0.0]), "B": np.array([2.0])}

@@ -47,7 +47,7 @@ def history(size: float) -> LibraryHistory:
             value += size if winch == "B" and number >= 8 else 0.0
             about = (winch, START + number * WEEK, "cell-gain", "gain_error", value, STD, "1")
             known.append(SessionEstimate(*about, (), {"tension": 150.0}))
-    return LibraryHistory(("cell-gain",), 60, fleet_history(known), {})
+    return LibraryHistory(("cell-gain",), 60, fleet_history(known), {}, {})
 
 
 def test_a_grid_shows_steps_and_odd_winches(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,20 @@ def test_holds_are_those_of_the_motion(sigma: float, count: float) -> None:
         assert abs(hold.stop - (start + size)) <= 2
 
 
+def test_a_servo_that_swings_by_a_count_between_rows_of_a_log_is_at_rest() -> None:
+    """Counts that are interpolated to the instants of another source are no whole numbers."""
+    sizes, count = [50] * 8, 1e-4
+    angle = motion(sizes, 0.0, count=count)
+    toggles = np.random.default_rng(4).random(angle.shape) < [0.0, 0.05, 0.3, 0.5]
+    angle = angle + count * toggles
+    for share in (0.1, 0.5, 0.9):
+        log = (1 - share) * angle[:-1] + share * angle[1:]
+        found = holds_of(log)
+        assert found is not None
+        assert len(found) == len(sizes)
+        assert all(abs(hold.stop - hold.start - 50) <= 3 for hold in found)
+
+
 def test_a_list_of_poses_has_no_holds() -> None:
     rng = np.random.default_rng(2)
     poses = rng.uniform(-3, 3, (60, LINES))

@@ -164,9 +164,10 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         return function(asked=Asked(profile, effect_files, winch, band, predicted), **others)
 
+    command: Callable[..., Any] = bundled
     for option in _MODEL_OPTIONS:
-        bundled = option(bundled)
-    return bundled
+        command = option(command)
+    return command
 
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:

@@ -51,7 +51,8 @@ def command(
 
     Runs of one winch that started on one UTC day, or have the same metadata session, belong
     together. Results are the tables diagnoses and estimates of the library. Ctrl-C keeps what is
-    done, and the next call goes on. Exit code 1: a session has no diagnosis.
+    done, and the next call goes on. Runs that are lost, unreadable or cut short are named. Exit
+    code 1: there is one, or a session has no diagnosis.
     """
     from winchkit.fleet.library.diagnose import diagnose_library
 
@@ -67,7 +68,10 @@ def command(
         )
     for session, reason in report.failures.items():
         note(f"{session}: {reason}")
+    for path, fault in report.faults.items():
+        note(f"{path}: {fault}")
     counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
-    tell(report.to_json(), [f"{counts}, {len(report.failures)} failed"])
+    runs = f"{len(report.faults)} run{'' if len(report.faults) == 1 else 's'} with a fault"
+    tell(report.to_json(), [f"{counts}, {len(report.failures)} failed, {runs}"])
     suggest_next("library", "list", folder)
-    return 1 if report.failures else 0
+    return 1 if report.failures or report.faults else 0

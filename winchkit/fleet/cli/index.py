@@ -34,6 +34,8 @@ def command(folder: str, profile: str | None) -> None:
         report = index_library(folder, profile, progress)
     for path, fault in report.faults.items():
         note(fault if path in fault else f"{path}: {fault}")
+    for path in report.removed:
+        note(f"{path}: is no longer there; removed with its diagnosis")
     counts = f"{len(report.indexed)} read, {report.unchanged} unchanged, "
     counts += f"{len(report.removed)} removed, {len(report.faults)} with a fault"
     tell(report.to_json(), [counts])

@@ -31,7 +31,7 @@ from winchkit.cli.core.output import json_flag, tell
 @click.option("--until", metavar="DATE", help="Last UTC day, YYYY-MM-DD.")
 @click.option(
     "--verdict",
-    type=click.Choice(["adequate", "explained", "partly", "unknown"]),
+    type=click.Choice(["adequate", "explained", "partly", "unknown", "undecided"]),
     help="Verdict of the session's diagnosis.",
 )
 @json_flag("Print the answer as JSON.")

@@ -9,7 +9,6 @@ import click
 
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_effect
-from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
@@ -61,8 +60,9 @@ def command(
     The same effects are fitted to all winches and dates, so that names do not change from session
     to session. Every series is tested for a step or a trend, and every winch against the others,
     at a false discovery rate of 1 % over all of them. The report says date, size, cost and what to
-    do. Exit code 1: something changed, a winch differs from the others or is beyond a limit, or
-    profiles were exchanged.
+    do, and names the sessions and runs that it leaves out or that were cut short. Exit code 1:
+    something changed, a winch differs from the others or is beyond a limit, profiles were
+    exchanged, or something is left out.
     """
     from winchkit.fleet.library.history import library_history
     from winchkit.fleet.report.text import history_text
@@ -77,26 +77,26 @@ def command(
             limits=known,
             progress=progress,
         )
-    for session, reason in found.failures.items():
-        note(f"{session}: {reason}")
     history = found.history
     told: dict[str, Any] = {
         **history.to_json(),
         "effects": found.effects,
         "sessions": found.sessions,
         "failures": found.failures,
+        "faults": found.faults,
+        "outdated": found.outdated,
         "swapped": [vars(swap) for swap in found.swapped],
     }
     sessions = f"{found.sessions} session{'' if found.sessions == 1 else 's'}"
     head = f"{sessions}, effects {', '.join(found.effects)}\n"
-    tell(told, [head, history_text(history, found.swapped)])
+    tell(told, [head, history_text(history, found.swapped, found.left_out)])
     if html:
         from winchkit.fleet.report.history import fleet_history_html
 
         title = "Maintenance report of a fleet"
-        write_page(html, fleet_history_html(found.history, title, found.swapped))
-    is_clear = not (history.changed or history.odd or history.beyond_limit or found.swapped)
-    return 0 if is_clear else 1
+        write_page(html, fleet_history_html(history, title, found.swapped, found.left_out))
+    differs = history.changed or history.odd or history.beyond_limit or found.swapped
+    return 1 if differs or found.left_out else 0
 
 
 def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], float]:

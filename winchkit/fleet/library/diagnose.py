@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from winchkit.fleet.library.faults import run_faults
 from winchkit.fleet.library.index import indexed, no_progress
 from winchkit.fleet.library.partitions import Partitions, Row
 from winchkit.fleet.library.sessions import winch_sessions
@@ -29,6 +30,8 @@ class FleetReport:
     """Sessions whose diagnosis was known."""
     failures: Mapping[str, str]
     """``winch session`` to the reason."""
+    faults: Mapping[str, str]
+    """Files whose runs are lost, unreadable or cut short, with the reason."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that ``winchkit fleet diagnose --json`` prints."""
@@ -37,6 +40,7 @@ class FleetReport:
             "diagnosed": self.diagnosed,
             "unchanged": self.unchanged,
             "failures": dict(self.failures),
+            "faults": dict(self.faults),
         }
 
 
@@ -73,7 +77,7 @@ def diagnose_library(
     Returns
     -------
     FleetReport
-        Counts, and failures with their reasons.
+        Counts, failures and runs with faults, with their reasons.
 
     Raises
     ------
@@ -99,7 +103,9 @@ def diagnose_library(
         with kept:
             for outcome in _outcomes(due, jobs, scheduler):
                 kept.take(outcome)
-    return FleetReport(kept.count - len(kept.failures), len(tasks) - len(due), kept.failures)
+    return FleetReport(
+        kept.count - len(kept.failures), len(tasks) - len(due), kept.failures, run_faults(tables)
+    )
 
 
 def _outcomes(due: Sequence[Task], jobs: int | None, scheduler: str | None) -> Iterator[Outcome]:
@@ -151,7 +157,7 @@ class _Keeping:
             self._write()
 
     def _write(self) -> None:
-        """Replace the rows of these sessions and profiles; estimates first.
+        """Replace the rows of these sessions, of other profiles too; estimates first.
 
         After a kill between the two tables the diagnosis is missing and is computed again.
         """
@@ -159,14 +165,13 @@ class _Keeping:
         if not outcomes:
             return
         rows = [outcome.diagnosis for outcome in outcomes]
-        known = {(row["winch"], row["session"], row["profile"]) for row in rows}
+        known = {(row["winch"], row["session"]) for row in rows}
         with self.tables.locked("diagnoses"):
             fitted = [row for outcome in outcomes for row in outcome.estimates]
             winches = {row["winch"] for row in rows}
 
             def replaced(row: Row) -> bool:
-                is_known = (row["winch"], row["session"], row["profile"]) in known
-                return is_known and row.get("kind") != "fixed"
+                return (row["winch"], row["session"]) in known
 
             for table, new in (("estimates", fitted), ("diagnoses", rows)):
                 touched = [path for winch in winches for path in self.tables.of_winch(table, winch)]

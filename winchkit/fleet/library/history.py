@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit.errors import FileError, RunError, UsageError, suggest
-from winchkit.fleet.library.index import indexed, no_progress, profile_path
+from winchkit.fleet.library.faults import run_faults
+from winchkit.fleet.library.index import indexed, no_progress, profile_of_runs, profile_path
 from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.library.sessions import WinchSession, winch_sessions
 
@@ -34,8 +35,24 @@ class LibraryHistory:
     """Every parameter over winches and time."""
     failures: Mapping[str, str]
     """``winch session`` to the reason why it was not fitted."""
+    faults: Mapping[str, str]
+    """Files whose runs are lost, unreadable or cut short, with the reason."""
+    outdated: int = 0
+    """Number of sessions whose diagnosis is by another profile, which says nothing here."""
     swapped: tuple[Swap, ...] = ()
     """Winches that have each other's profiles, where each has its own."""
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """One sentence per session without a fit, per run with a fault, and on old diagnoses."""
+        out = [f"session {name}: {reason}" for name, reason in self.failures.items()]
+        out += [f"run {path}: {fault}" for path, fault in self.faults.items()]
+        if self.outdated:
+            out.append(
+                f"diagnoses by another profile: {self.outdated}; their effects are not followed; "
+                "run 'winchkit fleet diagnose' again"
+            )
+        return tuple(out)
 
 
 def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
@@ -86,7 +103,8 @@ def library_history(
     Returns
     -------
     LibraryHistory
-        Changes with dates, odd winches, exchanged profiles, costs and dates of limits.
+        Changes with dates, odd winches, exchanged profiles, costs and dates of limits; sessions
+        and runs that are left out.
 
     Raises
     ------
@@ -106,7 +124,8 @@ def library_history(
     sessions = winch_sessions(tables)
     profiles, faults = _profiles(profile, {session.winch for session in sessions})
     own = {t.effect.id for known in profiles.values() for t in terms_of(known, catalogue)}
-    chosen = tuple(effects) or _followed(tables, sorted(own))
+    hashes = {winch: profile_of_runs(profile_path(profile, winch)).hash for winch in profiles}
+    chosen = tuple(effects) or _followed(tables, sorted(own), hashes)
     for name in chosen:
         if name not in catalogue:
             known = [effect.id for effect in catalogue]
@@ -127,7 +146,8 @@ def library_history(
     fitted = len(sessions) - len(failures)
     history = fleet_history(estimates, limits)
     swapped = swapped_by_radius(history.parameters, profiles, catalogue)
-    return LibraryHistory(chosen, fitted, history, failures, swapped)
+    outdated = 0 if effects else _outdated(tables, hashes)
+    return LibraryHistory(chosen, fitted, history, failures, run_faults(tables), outdated, swapped)
 
 
 def _profiles(
@@ -148,14 +168,25 @@ def _profiles(
     return profiles, faults
 
 
-def _followed(tables: Partitions, own: Sequence[str]) -> tuple[str, ...]:
+def _outdated(tables: Partitions, hashes: Mapping[str, str]) -> int:
+    """Number of diagnoses by other profiles than the winches' own; hash of the profile by winch."""
+    rows = tables.read("diagnoses", ("winch", "profile")).to_pylist()
+    return sum(hashes.get(row["winch"], row["profile"]) != row["profile"] for row in rows)
+
+
+def _followed(tables: Partitions, own: Sequence[str], hashes: Mapping[str, str]) -> tuple[str, ...]:
     """Effects that the diagnoses named, and those of the profiles; raises UsageError for none."""
     if not tables.files("diagnoses"):
         raise UsageError(
             f"{tables.runs}: has no diagnoses; run 'winchkit fleet diagnose' first, or name the "
             "effects to follow (--effect)"
         )
-    chosen = common_effects([*_named_sets(tables), *([effect] for effect in own)])
+    chosen = common_effects([*_named_sets(tables, hashes), *([effect] for effect in own)])
+    if not chosen and (outdated := _outdated(tables, hashes)):
+        raise UsageError(
+            f"{tables.runs}: its {outdated} diagnoses are by other profiles; run 'winchkit fleet "
+            "diagnose' again, or name the effects to follow (--effect)"
+        )
     if not chosen:
         raise UsageError(
             f"{tables.runs}: its diagnoses name no effect and its profiles have none; name the "
@@ -164,10 +195,14 @@ def _followed(tables: Partitions, own: Sequence[str]) -> tuple[str, ...]:
     return chosen
 
 
-def _named_sets(tables: Partitions) -> list[Sequence[str]]:
-    """Effects of every step: the certain one, or all of its set and of the others at its place."""
-    columns = ("key", "kind", "effect", "set", "certain", "place")
+def _named_sets(tables: Partitions, hashes: Mapping[str, str]) -> list[Sequence[str]]:
+    """Effects of every step: the certain one, or all of its set and of the others at its place.
+
+    ``hashes``: of the winches' present profiles; beside another one other effects are missing.
+    """
+    columns = ("key", "winch", "kind", "effect", "set", "certain", "place", "profile")
     rows = tables.read("estimates", columns).to_pylist()
+    rows = [row for row in rows if row["profile"] == hashes.get(row["winch"], row["profile"])]
     steps = {(row["key"], row["effect"]): row for row in rows if row["kind"] == "model"}
     ordered = [steps[key] for key in sorted(steps)]
     there: dict[str, dict[str, None]] = {}

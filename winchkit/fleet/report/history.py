@@ -26,11 +26,16 @@ _DAY = 86400.0
 """s."""
 
 
-def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap] = ()) -> str:
+def fleet_history_html(
+    history: FleetHistory,
+    title: str,
+    swapped: Sequence[Swap] = (),
+    left_out: Sequence[str] = (),
+) -> str:
     """The page: a row and a figure per change, limits, odd winches, exchanged profiles.
 
-    Returns: HTML, self-contained; the most significant changes have figures, in the order of
-    winches.
+    ``left_out``: a sentence for each session or run that is not in it, or was cut short. Returns:
+    HTML, self-contained; the most significant changes have figures, in the order of winches.
     """
     changed = history.changed
     drawn = sorted(changed[:_MOST_FIGURES], key=lambda pair: (pair[1].winch, pair[0].effect))
@@ -50,8 +55,10 @@ def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap
     )
     beyond = [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     differs = bool(history.odd or beyond or swapped)
-    tone = "partly" if changed or differs else "adequate"
+    tone = "partly" if changed or differs or left_out else "adequate"
     chip = "Changes" if changed else "Differences" if differs else "No change"
+    if chip == "No change" and left_out:
+        chip = "Incomplete"
     blocks = [figure_block(figure, _SIDE) for figure in figures]
     over_time = element("div", *blocks, class_="pair maps output") if blocks else Markup("")
     odd = [" ".join(" ".join(odd_texts(*pair)).split()) for pair in history.odd]
@@ -64,6 +71,7 @@ def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap
         section("limits", "Beyond a limit", bullets(beyond)),
         section("odd", "Winches that differ from the others", bullets(odd)),
         section("swapped", "Exchanged profiles", bullets([swap_text(swap) for swap in swapped])),
+        section("left-out", "Left out or cut short", bullets(left_out)),
         headed=False,
     )
 

@@ -45,18 +45,26 @@ class ChangeText:
     advice: str
 
 
-def history_text(history: FleetHistory, swapped: Sequence[Swap] = ()) -> str:
-    """Report of a fleet's history for a terminal."""
+def history_text(
+    history: FleetHistory, swapped: Sequence[Swap] = (), left_out: Sequence[str] = ()
+) -> str:
+    """Report of a fleet's history for a terminal.
+
+    ``left_out``: a sentence for each session or run that is not in it, or was cut short.
+    """
     lines = [line for pair in history.changed for line in _changed(*pair)]
     lines += [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     lines += [line for pair in history.odd for line in odd_texts(*pair)]
     lines += [swap_text(swap) for swap in swapped]
     if not lines:
-        lines = ["No change over time, and no winch that differs from the others."]
+        beside = " in the sessions that were fitted" if left_out else ""
+        lines = [f"No change over time, and no winch that differs from the others{beside}."]
     tested = sum(len(parameter.winches) for parameter in history.parameters)
     lines += ["", f"{tested} series of estimates; false discovery rate 1 % ({history.procedure})."]
     if history.undetermined:
         lines.append(f"{history.undetermined} estimates left out: their runs leave the value open.")
+    if left_out:
+        lines += ["", "left out or cut short:", *(f"  {text}" for text in left_out)]
     return "\n".join(lines)
 
 

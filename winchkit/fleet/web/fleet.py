@@ -61,7 +61,7 @@ class Fleet:
             out["fitted"] = {
                 "effects": list(self._found.effects),
                 "sessions": self._found.sessions,
-                "failures": dict(self._found.failures),
+                "failures": dict(self._found.failures) | dict(self._found.faults),
                 "changed": len(history.changed),
                 "odd": len(history.odd),
                 "winches": len({session.winch for session in sessions}),

@@ -43,6 +43,7 @@ from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, erro
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
 from winchkit.robot.calibration.selection import FitEnd, first_model, fitted_with_instruments
 from winchkit.robot.calibration.statistics import calibration_statistics
+from winchkit.robot.calibration.swivel_axes import axes_text, reversed_axes
 from winchkit.robot.files.poses import MeasuredPoses, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
@@ -104,6 +105,8 @@ class Calibrated(Plotted, Tabular):
     """Instruments at the lines whose readings do not follow the geometry, in words."""
     gross_errors: tuple[str, ...] = ()
     """Run and row of the poses that were left out of the fit and of the held-out error."""
+    reversed_axes: tuple[str, ...] = ()
+    """Lines whose swivel axes point the other way than the profile has them."""
     instrument_noise: Mapping[str, float] = field(default_factory=lambda: dict(START))
     """Standard deviations of the instruments by kind: known, else usual ones, SI."""
 
@@ -116,6 +119,8 @@ class Calibrated(Plotted, Tabular):
         """Reasons why the robot is not calibrated, in words."""
         if self.unexplained:
             yield f"not calibrated: {'; '.join(self.unexplained)}; nothing was written"
+        if self.reversed_axes:
+            yield f"not calibrated: {axes_text(self.reversed_axes)}"
         if lost := self._without_value:
             yield (
                 f"not calibrated: {lost} of {self.equations.count} equations have no value at the "
@@ -332,6 +337,7 @@ def calibrate(
         validation_lengths=lengths,
         ratios=ratios,
         unexplained=tuple(unexplained(equations, solution)),
+        reversed_axes=reversed_axes(chosen, options, progress),
         gross_errors=(*fit.place[wrong].tolist(), *validation.place[missed].tolist()),
         instrument_noise={**START, **(options.sigma or {})},
         found_instruments=chosen.free

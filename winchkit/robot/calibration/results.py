@@ -60,6 +60,7 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
             "alternatives": [list(lines) for lines in found.ratios.alternatives],
         },
         "gross_errors": list(found.gross_errors),
+        "reversed_axes": list(found.reversed_axes),
         "refused": found.refusal or None,
         "warnings": list(found.warnings),
         "converged": found.solution.converged,

@@ -76,7 +76,7 @@ _COUNTED = (
 _COUNTED_AS = {"reflector": 6}
 """Numbers of a reflector's offset in the criterion: as many as of a frame. With a platform that
 hardly turns the two are the same shift, which is then said to be the frame's."""
-_DELTA_CHI_SQUARE = 9.0
+DELTA_CHI_SQUARE = 9.0
 """Difference of criteria below which two explanations count as equal: the true one is worse by this
 much with probability at most 1/740."""
 _BEYOND_PRIOR = 3.0
@@ -212,7 +212,7 @@ def _with_home(
     declared, found = _fitted_with_tracker(trial, options, progress)
     found = _recentred(found, options, progress)
     count = int(np.count_nonzero(np.isfinite(found.equations.measured.motor_angle)))
-    price = len(equations.robot.names) * log(count) + _DELTA_CHI_SQUARE
+    price = len(equations.robot.names) * log(count) + DELTA_CHI_SQUARE
     if not found.criterion + price < best.criterion:
         return None
     return declared, found
@@ -226,7 +226,7 @@ def _fitted_with_tracker(
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
     declared = _declared(equations, predicted)
     if "position" not in equations.kinds:
-        return declared, _fitted(declared, options, progress)
+        return declared, fitted(declared, options, progress)
     wider = [
         [
             trial
@@ -245,21 +245,23 @@ def _fitted_with_tracker(
     first = None
     if "home_length" in equations.parameters.block:
         # They may be far off at the start, which no registration says.
-        first = _fitted(_starting_at_home(declared, own), options, progress)
+        started_there, error = _starting_at_home(declared, own)
+        if not error > limit:
+            first = fitted(started_there, options, progress)
     elif is_near(declared):
-        first = _fitted(declared, options, progress)
+        first = fitted(declared, options, progress)
     best = first
     for trials in wider:
         if best is not None and not any(_shows_more(best, trial) for trial in trials):
             break
-        fits = [_fitted(trial, options, progress) for trial in trials if is_near(trial)]
+        fits = [fitted(trial, options, progress) for trial in trials if is_near(trial)]
         fits = [fit for fit in fits if fit.is_plausible]
         if first is not None:
             fits = [fit for fit in fits if fit.error < _LEAST_FALL * first.error]
         chosen = None
         for fit in fits:
             # Of equal explanations the one that stands first is kept: a frame before a reflector.
-            if chosen is None or fit.with_prior < chosen.with_prior - _DELTA_CHI_SQUARE:
+            if chosen is None or fit.with_prior < chosen.with_prior - DELTA_CHI_SQUARE:
                 chosen = fit
         if chosen is None and best is None:
             continue
@@ -267,21 +269,27 @@ def _fitted_with_tracker(
             break
         best = chosen
     if best is None:
-        return declared, _fitted(declared, options, progress)
+        return declared, fitted(declared, options, progress)
     return declared, best if best is first else _mounted(best, predicted, options, progress)
 
 
-def _starting_at_home(equations: RobotEquations, own: InstrumentValues) -> RobotEquations:
+def _starting_at_home(
+    equations: RobotEquations, own: InstrumentValues
+) -> tuple[RobotEquations, float]:
     """The equations with lengths at home by an adjustment, where the tracker's frame is known and
-    they are beyond their prior."""
+    they are beyond their prior; and its misfit, m.
+
+    In a frame that is another one no lengths at home explain the positions: a fit would creep.
+    """
     if "frame" in own.free:
-        return equations
+        return equations, 0.0
     index = equations.parameters.block["home_length"]
-    found = lengths_at_home(equations.robot, equations.measured, _LEAST_MISFIT)
+    found, left = lengths_at_home(equations.robot, equations.measured, _LEAST_MISFIT)
     beyond = np.abs(found) > _BEYOND_PRIOR * equations.parameters.std[index]
     if not np.any(beyond):
-        return equations
-    return replace(equations, parameters=equations.parameters.starting("home_length", found))
+        return equations, left
+    starting = equations.parameters.starting("home_length", found)
+    return replace(equations, parameters=starting), left
 
 
 def _recentred(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
@@ -295,7 +303,7 @@ def _recentred(best: FitEnd, options: Options, progress: ProgressCallback) -> Fi
             break
         values = best.solution.state.values[own]
         parameters = best.equations.parameters.starting("home_length", values)
-        best = _fitted(replace(best.equations, parameters=parameters), options, progress)
+        best = fitted(replace(best.equations, parameters=parameters), options, progress)
     return best
 
 
@@ -307,7 +315,7 @@ def _with_more(best: FitEnd, options: Options, progress: ProgressCallback) -> Fi
             with_instruments(best.equations, replace(own, free=own.free | {name}))
             for name in _undeclared(best.equations, own)
         ]
-        fits = [_fitted(t, options, progress, best) for t in trials if _shows_more(best, t)]
+        fits = [fitted(t, options, progress, best) for t in trials if _shows_more(best, t)]
         fits = [fit for fit in fits if fit.criterion < best.criterion and not fit.at_bound]
         if not fits:
             return best
@@ -341,7 +349,7 @@ def _with_ratios(best: FitEnd, options: Options, progress: ProgressCallback) -> 
         return best
     effects = (*best.equations.effects, *(f"gear-ratio/{line}" for line in odd))
     trial = with_instruments(replace(best.equations, effects=effects), _instruments(best.equations))
-    found = _fitted(trial, options, progress, best)
+    found = fitted(trial, options, progress, best)
     return found if found.with_prior < best.with_prior else best
 
 
@@ -429,13 +437,13 @@ def _mounted(best: FitEnd, predicted: Pose, options: Options, progress: Progress
     if own is None or "rotation" not in best.equations.kinds or "mounting" in own.free:
         return best
     trial = _registered(best.equations, own, own.free | {"mounting"}, predicted)
-    found = _fitted(trial, options, progress)
+    found = fitted(trial, options, progress)
     turned = (rms(fit.errors.angle) for fit in (found, best))
     after, before = turned
     return found if found.criterion < best.criterion and after < _LEAST_FALL * before else best
 
 
-def _fitted(
+def fitted(
     equations: RobotEquations,
     options: Options,
     progress: ProgressCallback,

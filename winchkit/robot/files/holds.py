@@ -8,9 +8,9 @@ winch stays within
 
     |θ − mean θ| ≤ z σ,      z = Φ⁻¹(1 − α / 2N)
 
-of N angles in all (Bonferroni), or within two counts where an angle alternates between adjacent
-counts. Rows are poses already where consecutive angles differ as much as angles do in general: then
-σ is of the size of their spread and no stretch is looked for.
+of N angles in all (Bonferroni), or within two swings where an angle swings back and forth by a
+count or so, as a servo at rest does. Rows are poses already where consecutive angles differ as much
+as angles do in general: then σ is of the size of their spread and no stretch is looked for.
 
 References
 ----------
@@ -38,8 +38,9 @@ _MOST_NOISE = 0.05
 """Largest noise of an angle, in its spread, in a log: rows that are poses have a ratio near one."""
 _QUARTILE = 0.25
 """Lower quartile of absolute differences: up to three quarters of the samples may move."""
-_ONE_COUNT = 1.5
-"""Changes below this many counts are those of one count; midway between one and two."""
+_SHORT_SWING, _FEWEST_SWINGS = 2, 3
+"""Changes of a swing that is noise (one, or two where a log interpolates between instants), and
+their least number (rules of thumb)."""
 _ROUNDING = 1e-9
 """Relative to the largest angle: far above rounding of floating point (1e-16), below a count."""
 _OF_NORMAL = 0.31864
@@ -76,13 +77,15 @@ def _tolerance(angle: Array) -> Array | None:
         return None
     width = NormalDist().inv_cdf(1 - _LEVEL / (2 * count))
     sigma, step = np.zeros(angle.shape[1]), np.zeros(angle.shape[1])
+    some = angle[:, np.any(np.isfinite(angle), axis=0)]
+    largest = float(np.max(np.nanmax(some, axis=0) - np.nanmin(some, axis=0)))
     moves = False
     for line, values in enumerate(angle.T):
         known = values[np.isfinite(values)]
         if len(known) < 2 * _LEAST_ROWS:
             continue
         first, third = np.abs(np.diff(known)), np.abs(np.diff(known, 3))
-        step[line] = _dither(np.diff(known))
+        step[line] = _swing(np.diff(known), _MOST_NOISE * largest)
         sigma[line] = min(
             float(np.quantile(first, _QUARTILE)) / (_OF_NORMAL * sqrt(2.0)),
             float(np.quantile(third, _QUARTILE)) / (_OF_NORMAL * _THIRD),
@@ -96,15 +99,20 @@ def _tolerance(angle: Array) -> Array | None:
     return np.maximum.reduce([width * sigma, 2 * step, rounding]) if moves else None
 
 
-def _dither(change: Array) -> float:
-    """Size of a count where an angle alternates between adjacent counts, rad; else zero."""
+def _swing(change: Array, most: float) -> float:
+    """Median swing of an angle at rest between two turning points, rad; zero where it has none.
+
+    A swing below ``most`` (rad) of one or two changes: those of a motion have more.
+    """
     change = change[change != 0]
-    if len(change) < 2:
+    if not len(change):
         return 0.0
-    count = float(np.min(np.abs(change)))
-    small = np.abs(change) < _ONE_COUNT * count
-    back = small[1:] & small[:-1] & (change[1:] * change[:-1] < 0)
-    return count if np.count_nonzero(back) > _QUARTILE * np.count_nonzero(small) else 0.0
+    turns = np.flatnonzero(change[1:] * change[:-1] < 0) + 1
+    starts = np.concatenate([[0], turns])
+    swings = np.abs(np.add.reduceat(change, starts))
+    length = np.diff([*starts, len(change)])
+    short = swings[(length <= _SHORT_SWING) & (swings < most)]
+    return float(np.median(short)) if len(short) >= _FEWEST_SWINGS else 0.0
 
 
 def _stretches(angle: Array, tolerance: Array) -> list[slice]:

@@ -68,7 +68,7 @@ class Pose:
     rotation: Array
     """Platform to base, (p, 3, 3)."""
 
-    def __getitem__(self, rows: slice | NDArray[Any] | list[int]) -> Pose:
+    def __getitem__(self, rows: slice | np.bool_ | NDArray[Any] | list[int]) -> Pose:
         """Some of the poses, by a slice, a mask or indices."""
         return Pose(self.position[rows], self.rotation[rows])
 

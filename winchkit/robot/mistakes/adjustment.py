@@ -98,11 +98,13 @@ def misfit(adjustment: RobotEquations, solution: Solution, sigma: float) -> floa
     return sigma * float(np.sqrt(np.median(square) + of_priors))
 
 
-def lengths_at_home(robot: Robot, measured: MeasuredPoses, sigma: float) -> Array:
-    """Cable at home beyond that of the geometry, (n,), m, of positions in a known frame."""
+def lengths_at_home(robot: Robot, measured: MeasuredPoses, sigma: float) -> tuple[Array, float]:
+    """Cable at home beyond that of the geometry, (n,), of positions in a known frame, and the
+    misfit that is left with it; m."""
     tracker = declared_tracker(robot.profile)
     equations = adjustment_of(robot, measured, tracker, frozenset({"tracker_frame", "reflector"}))
     angles = np.full_like(measured.position, np.nan)
     shown = start_pose(measured.position, angles, robot.home, np.ones(6))
     found = adjusted(equations, robot.guided(pose_behind(tracker, shown)), sigma)
-    return np.asarray(found.state.values[equations.parameters.block["home_length"]])
+    lengths = np.asarray(found.state.values[equations.parameters.block["home_length"]])
+    return lengths, misfit(equations, found, sigma)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 import can
 from canopen.lss import (
@@ -16,7 +16,7 @@ from canopen.lss import (
     LssMaster,
 )
 
-from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.bus import Handler
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.errors import DeviceRefused, NoReply, UsageError
 
@@ -62,10 +62,25 @@ def check_bitrate(bitrate: int | None) -> None:
         raise UsageError(f"{bitrate} bit/s is not in the standard's table: {known}")
 
 
+class LssPort(Protocol):
+    """What LSS needs of a bus; ``CanBus`` is one, a rehearsal another."""
+
+    @property
+    def name(self) -> str:
+        """Of the bus."""
+
+    @property
+    def network(self) -> Any:
+        """canopen's network, which has the LSS master."""
+
+    def on(self, identifier: int, handler: Handler) -> None:
+        """Call ``handler`` for every frame with this identifier."""
+
+
 class LssLine:
     """The LSS master of a bus; one at a time."""
 
-    def __init__(self, bus: CanBus) -> None:
+    def __init__(self, bus: LssPort) -> None:
         self._name = bus.name
         self._master: Any = bus.network.lss
         bus.on(_REPLY, lambda data, now: self._master.on_message_received(_REPLY, data, now))
