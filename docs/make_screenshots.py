@@ -104,7 +104,7 @@ def main() -> None:
         runs = Path(folder) / "runs"
         runs.mkdir()
         for run in example_runs("demo-eccentric-drum").runs:
-            write_run(run, runs / f"{run.name}.csv")
+            write_run(run, runs / f"{run.name}.csv", replace=True)
         recorded = Path(folder) / "poses.csv"
         recorded.write_text(csv(poses(Truth(), 60, 7), angles=True))
         profile = ["-p", "bench-spiral"]

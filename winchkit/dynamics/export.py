@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Literal
 
-from winchkit.arguments import require_type
+from winchkit.arguments import positive, require_type
 from winchkit.dynamics.c_code import as_json, c_header
 from winchkit.dynamics.mjcf import mjcf
 from winchkit.dynamics.python_code import python_module
@@ -58,6 +58,8 @@ def export_model(
     """
     require_type(profile, WinchProfile, "profile")
     terms = terms_of(profile, catalogue)
+    if load_mass is not None:
+        load_mass = positive("export_model", "load_mass", load_mass)
     if to == "c":
         return ExportedModel(c_header(profile, terms))
     if to == "python":

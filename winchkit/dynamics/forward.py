@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from winchkit.arguments import require_type
+from winchkit.arguments import number, positive, require_type
 from winchkit.arrays import Array
 from winchkit.dynamics.balance import balance
 from winchkit.dynamics.drives import RECORDED, Inputs, cascade
@@ -28,6 +28,8 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.units import GRAVITY
 
+_COARSEST = 0.01
+"""Relative error of a step beyond which a simulation is none; numerical."""
 _REFERENCE_STEP = 1e-3
 """s: between the points of a programme's reference, whose acceleration builds up in 0.3 s."""
 _TEMPERATURE = 20.0
@@ -73,7 +75,7 @@ def forward(
     rate : float
         Samples of a programme per second, Hz; a run is simulated at its own times.
     tolerance : float
-        Relative error of a step of the integration.
+        Relative error of a step of the integration, at most 0.01.
 
     Returns
     -------
@@ -96,6 +98,11 @@ def forward(
     the unstrained cable, as in the prediction.
     """
     require_type(profile, WinchProfile, "profile")
+    tolerance = positive("forward", "tolerance", tolerance, _COARSEST)
+    if load_mass is not None:
+        load_mass = positive("forward", "load_mass", load_mass)
+    if initial_speed is not None:
+        initial_speed = number("forward", "initial_speed", initial_speed)
     if load_mass is not None and isinstance(profile, AxisProfile):
         raise UsageError(
             f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
@@ -253,7 +260,7 @@ def _of_programme(
     here = ends[-1] if ends else profile.reference.cable_length or 0.0
     mass = load_mass
     lengths, speeds = [np.array([here])], [np.zeros(1)]
-    for number, step in enumerate(programme.step, start=1):
+    for place, step in enumerate(programme.step, start=1):
         if step.load_mass is not None:
             if mass is not None and load_mass is None and step.load_mass != mass:
                 break
@@ -266,7 +273,7 @@ def _of_programme(
             gone, speed = np.zeros(count), np.zeros(count)
         elif step.acceleration is None:
             raise UsageError(
-                f"programme '{programme.name}', step {number}: gives no acceleration, which a "
+                f"programme '{programme.name}', step {place}: gives no acceleration, which a "
                 'bench would limit; add acceleration = "0.8 m/s^2"'
             )
         else:

@@ -26,7 +26,9 @@ def read_document(path: Path) -> Any:
 
 
 def write_document(document: Any, path: Path) -> None:
-    """Write a document, empty lists of tables left out. Raises FileError."""
+    """Write a document, empty lists of tables left out. Raises FileError, also without .toml."""
+    if path.suffix.lower() != ".toml":
+        raise FileError(Fault("a profile is a .toml file; name one", str(path)))
     for name in ("effect", "ledger"):
         if name in document and not len(document[name]):
             del document[name]

@@ -55,12 +55,12 @@ def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: J
     tables(document, "ledger").append(entry)
 
 
-def undo(source: Path, out: Path) -> str:
+def undo(source: str | Path, out: str | Path) -> str:
     """Copy a profile without its last step.
 
     Parameters
     ----------
-    source, out : Path
+    source, out : str or Path
         The profile, and its copy.
 
     Returns
@@ -86,7 +86,7 @@ def undo(source: Path, out: Path) -> str:
         document[part][name] = value
     del steps[len(steps) - 1]
     _replace(document, effects)
-    write_document(document, out)
+    write_document(document, path_of(out, "out"))
     return f"{last['did']} {last['effect']}"
 
 

@@ -64,5 +64,5 @@ def export(
 
         write_parquet(run, output)
     else:
-        write_run(run, output)
+        write_run(run, output, replace=True)
     return run

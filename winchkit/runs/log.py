@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -112,7 +113,17 @@ def joined(logs: Sequence[Log]) -> Log:
         if _identity(other) != _identity(first):
             message = f"is not a part of the same log as {first.path}"
             raise RunError(Fault(message, other.path))
-    samples = {
+    for before, after in pairwise(logs):
+        for topic, samples in before.samples.items():
+            later = after.samples[topic].times
+            if len(samples) and len(later) and later[0] <= samples.times[-1]:
+                message = (
+                    f"begins at {later[0]:.6g} s, before {before.path} ends "
+                    f"({samples.times[-1]:.6g} s): the parts of one log follow each other; convert "
+                    "recordings one by one"
+                )
+                raise RunError(Fault(message, after.path))
+    samples_of = {
         source.topic: SourceSamples.joined(
             [log.samples[source.topic] for log in logs], len(source.signals)
         )
@@ -120,7 +131,7 @@ def joined(logs: Sequence[Log]) -> Log:
     }
     return replace(
         first,
-        samples=samples,
+        samples=samples_of,
         events=tuple(note for log in logs for note in log.events),
         counters=tuple(note for log in logs for note in log.counters),
         end=logs[-1].end,

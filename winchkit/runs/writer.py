@@ -16,6 +16,7 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_type
 from winchkit.errors import UsageError
+from winchkit.runs.files import refuse_existing
 from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
 from winchkit.runs.recording.log_file import create
@@ -63,7 +64,7 @@ def open_writer(
     return kind_for(path)(Path(path), columns, metadata or {}, clock, begin)
 
 
-def write_run(run: Run, path: str | Path) -> None:
+def write_run(run: Run, path: str | Path, *, replace: bool = False) -> None:
     """Write a run in the format of the file's suffix, with the units of its channels.
 
     Parameters
@@ -71,17 +72,21 @@ def write_run(run: Run, path: str | Path) -> None:
     run : Run
         The run.
     path : str or Path
-        File; an earlier one is replaced.
+        File.
+    replace : bool
+        Write over a file of that name.
 
     Raises
     ------
     FileError
         Where the file cannot be written.
     UsageError
-        For an unknown suffix, and for a file to which a log is being written.
+        For an unknown suffix, a file that exists and is not to be replaced, and one to which a log
+        is being written.
     """
     require_type(run, Run, "run")
     kind = kind_for(path)
+    refuse_existing(path_of(path), replace)
     columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
     series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
     begin = partial(create, path_of(path), replace=True)

@@ -431,7 +431,7 @@ class DiagnoseView:
         runs = []
         for run in simulated.runs:
             path = folder / f"{run.name}.csv"
-            write_run(run, path)
+            write_run(run, path, replace=True)
             file = f"{place}/{path.name}"
             runs.append(LoadedRun(path, read_run(path), file=file, origin=origin))
         self._open_profile(simulated.profile)
@@ -454,7 +454,7 @@ class DiagnoseView:
         while path.exists() and path not in self._written:
             path, number = self.work / f"imported-{number}" / path.name, number + 1
         folder = self._made(path.parent)
-        write_run(run, path)
+        write_run(run, path, replace=True)
         self._written.add(path)
         self._open([path], origin=import_command(source.name, answers, self.named(folder)))
 

@@ -130,3 +130,11 @@ def test_parts_of_different_logs_are_not_joined(tmp_path: Path) -> None:
         read_log([tmp_path / "a.mcap", tmp_path / "b.csv"])
     with pytest.raises(RunError, match="no such file"):
         read_run(tmp_path / "none.mcap")
+
+
+def test_recordings_of_one_time_are_no_parts_of_one_log(tmp_path: Path) -> None:
+    """Their rows would be interleaved, or those of one of them lost."""
+    written(tmp_path / "a.csv", 1.0)
+    written(tmp_path / "b.csv", 1.0)
+    with pytest.raises(RunError, match=r"before .*a\.csv ends .*one by one"):
+        read_log([tmp_path / "a.csv", tmp_path / "b.csv"])

@@ -37,6 +37,13 @@ def check_new_file(path: str | Path, _option: str = "-o") -> None:
     _check_permission(target if target.exists() else target.parent, path)
 
 
+def check_new_profile(path: str | Path, option: str = "-o") -> None:
+    """Raise UsageError for a file that is no .toml file, FileError as :func:`check_new_file`."""
+    if Path(path).suffix.lower() != ".toml":
+        raise UsageError(f"{option} {path}: a profile is a .toml file; name one")
+    check_new_file(path, option)
+
+
 def check_folder(path: str | Path, option: str = "-o") -> None:
     """Raise UsageError for a folder that cannot be made, since a file is in its way.
 

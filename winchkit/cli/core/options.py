@@ -20,7 +20,7 @@ from winchkit.cli.core.completion import (
     complete_winch,
     files_of_kind,
 )
-from winchkit.cli.core.early_checks import check_folder, check_new_file
+from winchkit.cli.core.early_checks import check_folder, check_new_file, check_new_profile
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.cli.core.standard_input import Readable
@@ -176,14 +176,17 @@ def duration_option(help: str, example: str = "10 s", default: str | None = None
     return quantity_option(*names, of="time", help=help, example=example, default=default)
 
 
+_OUTPUT_CHECKS = {"DIR": check_folder, "NEW.toml": check_new_profile}
+
+
 def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:
     """The option ``-o``: where a command writes; ``names`` are further spellings of it.
 
-    With the metavar ``DIR`` a folder, which may be made, else a file in an existing folder: a place
-    that cannot be written is refused before the work, unless the command has a ``callback`` of its
-    own.
+    With the metavar ``DIR`` a folder, which may be made, else a file in an existing folder, with
+    ``NEW.toml`` a profile: a place that cannot be written is refused before the work, unless the
+    command has a ``callback`` of its own.
     """
-    more.setdefault("callback", checked(check_folder if metavar == "DIR" else check_new_file))
+    more.setdefault("callback", checked(_OUTPUT_CHECKS.get(metavar, check_new_file)))
     return click.option("-o", "--output", *names, metavar=metavar, help=help, **more)
 
 

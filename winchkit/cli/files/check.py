@@ -141,12 +141,16 @@ def _about_computer() -> tuple[str, ...]:
 def _run(file: str) -> Verdict:
     from winchkit.runs import read_run
     from winchkit.runs.info import summary_of
-    from winchkit.runs.sanity.ground import ground_mask, load_on_ground
+    from winchkit.runs.sanity.ground import ON_GROUND
+    from winchkit.runs.sanity.inspection import inspect_run
+    from winchkit.runs.sanity.saturation import SATURATED
 
     run = read_run(file)
-    every = [run.of_winch(winch) for winch in run.winches()]
-    grounded = [found for own in every for found in load_on_ground(own, ground_mask(own))]
-    told = [f"{found.channel} {found.text}" for found in grounded]
+    told = [
+        f"{found.channel}: {found.text}"
+        for found in inspect_run(run).findings
+        if found.code in (ON_GROUND, SATURATED)
+    ]
     notes = tuple(Fault(note, file) for note in (*run.notes, *told))
     return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
 

@@ -77,7 +77,7 @@ def write_runs(
         raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
     entries: list[dict[str, Any]] = []
     for (_, run), target in zip(results, targets, strict=True):
-        write_run(run, target)
+        write_run(run, target, replace=True)
         summary = summary_of(run)
         entries.append(
             {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
@@ -45,6 +46,7 @@ from winchkit.cli.core.terminal import progress_bar
 @quantity_option("--rate", of="frequency", default="100 Hz", help="Sampling rate of a programme.")
 @effects_option
 @output_option("The simulated run: a .csv or .mcap file.", required=True)
+@click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @json_flag("Print the summary as JSON.")
 def command(
     *,
@@ -57,6 +59,7 @@ def command(
     rate: str,
     effects: Sequence[str],
     output: str,
+    replace: bool,
 ) -> None:
     """Simulate the motion of PROFILE with its effects and write it as a run, without noise.
 
@@ -68,11 +71,13 @@ def command(
     from winchkit.dynamics.forward import forward
     from winchkit.effects import load_catalogue
     from winchkit.runs import read_run, write_run
+    from winchkit.runs.files import refuse_existing
     from winchkit.runs.info import summary_of
     from winchkit.schema.read import read_profile, read_programme
     from winchkit.sim.bench import programme_path
     from winchkit.units import parse
 
+    refuse_existing(Path(output), replace)
     declared = read_profile(find("profiles", profile))
     dimension = "speed" if declared.is_linear else "angular speed"
     with progress_bar() as progress:
@@ -87,7 +92,7 @@ def command(
             initial_speed=None if initial_speed is None else parse(initial_speed, dimension),
             rate=quantity(rate, "frequency"),
         )
-    write_run(run, output)
+    write_run(run, output, replace=replace)
     summary = summary_of(run)
     note(f"{output}: {summary.text}")
     tell({"profile": profile, "output": output, "summary": summary}, [])

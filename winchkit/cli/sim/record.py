@@ -138,7 +138,7 @@ def _written(runs: Iterable[Run], folder: Path, suffix: str) -> Iterator[tuple[P
     for run in runs:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{run.name}.{suffix}"
-        write_run(run, path)
+        write_run(run, path, replace=True)
         yield path, run
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.arguments import require_type, require_types
+from winchkit.arguments import number, require_type, require_types
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
@@ -45,6 +45,7 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.quantisation import quantisation_noise
+from winchkit.runs.sanity.saturation import SATURATED
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -153,7 +154,12 @@ class Dataset:
     @property
     def caveats(self) -> tuple[str, ...]:
         """Codes of what these runs cannot exclude: suspect channels first, then their repeats."""
-        limits = [f.code for f in self.sanity if f.code in (COPIES, OUTLYING, ROUNDED_ALIKE)]
+        limits = [
+            f.code
+            for f in self.sanity
+            if f.code in (COPIES, OUTLYING, ROUNDED_ALIKE)
+            or (f.code, f.channel) == (SATURATED, "motor_torque")
+        ]
         return tuple(
             dict.fromkeys(
                 [*caveats(self.sanity), *limits, *([] if self.repeated else [NO_REPEATS])]
@@ -186,7 +192,7 @@ def prepare(
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
-    if band is not None and not 0 < band < np.inf:
+    if band is not None and number("low-pass", "band", band) <= 0:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     runs = rotary_runs(runs, is_linear_axis=profile.is_linear)
     with errors_in_units_of(profile):

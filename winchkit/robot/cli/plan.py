@@ -52,7 +52,7 @@ def tell_poses(
     if output and best is not None:
         from winchkit.runs import write_run
 
-        write_run(plan.run(best), output)
+        write_run(plan.run(best), output, replace=True)
         note(f"written: {output}, the poses '{best.kind.name}'")
     elif output:
         click.echo(f"nothing written to {output}: no such poses show more", err=True)

@@ -135,7 +135,7 @@ class PoseSeries:
         counts: dict[str, int] = {}
 
         def keep(run: Run) -> None:
-            write_run(run, files[run.name])
+            write_run(run, files[run.name], replace=True)
             counts[run.name] = len(run.time)
 
         try:

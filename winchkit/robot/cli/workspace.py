@@ -64,6 +64,7 @@ _SLICES = 12
 @click.option("--to", "end", metavar="PLACE", help="Highest corner.")
 @click.option("--of", "condition", metavar="CONDITION", help="Condition of the mesh.")
 @output_option("Write the surface (.ply, .obj) or every cell (.csv).")
+@click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @json_flag("Print the answer as JSON, in SI units.")
 def command(
     robot: str | None,
@@ -80,6 +81,7 @@ def command(
     end: str | None,
     condition: str | None,
     output: str | None,
+    replace: bool,
 ) -> None:
     """Compute the workspace of ROBOT, a profile, on a grid of positions.
 
@@ -90,7 +92,10 @@ def command(
     """
     from winchkit.cli.core.quantities import optional, quantity
     from winchkit.robot.workspace.workspace import grid_of, workspace_of
+    from winchkit.runs.files import refuse_existing
 
+    if output:
+        refuse_existing(Path(output), replace)
     given: dict[str, Any] = {
         "force": optional(force, "force"),
         "moment": optional(moment, "torque"),

@@ -101,6 +101,20 @@ class CableDemand:
     bodies: tuple[BodySpec, ...] = ()
     """Boxes and cylinders."""
 
+    def __post_init__(self) -> None:
+        """Refuse what is no magnitude; raises UsageError."""
+        numbers = {
+            "force": (self.force, "N"),
+            "moment": (self.moment, "N m"),
+            "speed": (self.speed, "m/s"),
+            "rotation speed": (self.rotation_speed, "rad/s"),
+            "cable speed": (0.0 if self.cable_speed is None else self.cable_speed, "m/s"),
+            "clearance": (self.clearance or 0.0, "m"),
+        }
+        for name, (value, unit) in numbers.items():
+            if not np.all(np.asarray(value) >= 0.0):
+                raise UsageError(f"{name} {value} {unit}: it is a magnitude; give 0 or more")
+
 
 @dataclass(frozen=True)
 class Workspace:

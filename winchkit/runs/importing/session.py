@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from winchkit.arguments import number, require_types
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 from winchkit.runs.importing.answers import Answers, answers_of, read_answers
 from winchkit.runs.importing.assignment import Guess
@@ -95,6 +96,11 @@ def import_runs(
         names = ", ".join(sorted(unknown))
         raise UsageError(f"import_runs has no {names}; it has {', '.join(sorted(known))}")
     files = [paths] if isinstance(paths, str | Path) else [*paths]
+    require_types(files, (str, Path), "paths")
+    if not files:
+        raise UsageError("paths: no file to import")
+    if lag is not None:
+        lag = number("import_runs", "lag", lag)
     declared = read_mapping(mapping) if isinstance(mapping, str | Path) else mapping
     guesses = guesses_of([read_table(file) for file in files], read_answers(answers), declared)
     if questions := [(g.table.path, q) for g in guesses for q in g.questions]:

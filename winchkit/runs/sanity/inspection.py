@@ -17,7 +17,7 @@ from winchkit.runs.sanity.outliers import outlier_masks, outliers
 from winchkit.runs.sanity.quantisation import quantised, resolutions
 from winchkit.runs.sanity.repeated_values import constant, repeated_values
 from winchkit.runs.sanity.sampling import sampling
-from winchkit.runs.sanity.saturation import saturated
+from winchkit.runs.sanity.saturation import SATURATED, at_limit, saturated
 from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 
 _INSTRUMENTS = {"tension", "tension_gross", "load", "load_gross", "motor_torque", "cable_length"}
@@ -35,7 +35,7 @@ class Inspection:
     resolutions: Mapping[str, float]
     """Resolution of every channel of the model, in its unit; 0 where none is found."""
     outliers: Mapping[str, NDArray[np.bool_]]
-    """Spikes of the channels that have some, (n,)."""
+    """Spikes of the channels that have some, and torques at the limit of an instrument, (n,)."""
     on_ground: NDArray[np.bool_]
     """Samples in which the cable does not carry the load, (n,)."""
 
@@ -50,6 +50,11 @@ def inspect_run(run: Run) -> Inspection:
         if kind in CHANNEL_DIMENSIONS and np.isfinite(run[name]).any():
             out += _channel(run, name, steps[name], is_instrument=kind in _INSTRUMENTS)
     out += outliers(run, masks)
+    for finding in out:
+        if finding.code == SATURATED and finding.channel.endswith("motor_torque"):
+            limited = at_limit(run[finding.channel], steps[finding.channel])
+            if limited.any():
+                masks[finding.channel] = masks.get(finding.channel, limited) | limited
     held = np.zeros(len(run), dtype=bool)
     for winch in run.winches():
         out += velocity_consistency(run, winch)

@@ -12,6 +12,8 @@ from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding, share
 
+SATURATED = "saturated"
+"""Code of the finding."""
 _LEAST_SAMPLES = 5
 """Fewer equal samples at an end are an extremum that the resolution flattens. Rule of thumb."""
 _TIES = 0.01
@@ -29,6 +31,13 @@ _LEAST_LEVELS = 8
 """Levels below which the extreme of a quantised channel is one of the few values that it has."""
 _OVERSHOOT = 3.0
 """Steps by which a continued slope would pass the level: below, it could have ended there."""
+_JITTER = 0.5
+"""Share of second differences that alternate from which a channel has noise on a slope as well:
+white noise has three quarters."""
+_ABOVE_STEP = 3.0
+"""Noise in steps of the resolution from which equal values are no matter of rounding."""
+_FORCES = ("motor_torque", "tension", "load", "motor_current")
+"""Channels whose instruments have noise at rest as well: an encoder at rest repeats its value."""
 _BEFORE = 6
 """Samples before a level from which its slope is continued: few, since a motion bends."""
 
@@ -43,7 +52,8 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
     above the noise nothing can be concluded. A channel without
     noise may rest at its extreme, but then approaches it slowly: there, the linear extrapolation of
     the two samples before must exceed the extreme by three times the second differences before it.
-    An extreme of zero is that of an instrument at rest.
+    A force with noise on its slopes has it at its extreme too. An extreme of zero is that of an
+    instrument at rest.
     """
     values = run[name]
     values = values[np.isfinite(values)]
@@ -54,7 +64,12 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
         level = float(signal.max())
         at = signal >= level - 1e-9 * float(np.ptp(values))
         count = int(np.count_nonzero(at))
-        if count < _LEAST_SAMPLES or level == 0 or not _is_cut_off(signal, at, level):
+        if count < _LEAST_SAMPLES or level == 0:
+            continue
+        noisy = name.rpartition(".")[2] in _FORCES and _is_noisy(
+            signal, at | (signal == signal.min()), step
+        )
+        if not noisy and not _is_cut_off(signal, at, level):
             continue
         if np.ptp(values) < _LEAST_LEVELS * step:
             return
@@ -63,7 +78,35 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
             f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
             "instrument or the logger saturates; larger errors there are no effect of the winch"
         )
-        yield Finding("saturated", run.name, name, count / len(values), text)
+        yield Finding(SATURATED, run.name, name, count / len(values), text)
+
+
+def at_limit(values: Array, step: float) -> NDArray[np.bool_]:
+    """Samples of a force with noise at an extreme that repeats and is not zero, (n,).
+
+    None of a force without noise: a computed friction has the same value in all of its motion.
+    """
+    out = np.zeros(len(values), dtype=bool)
+    for end in (np.nanmin(values), np.nanmax(values)):
+        at = values == end
+        if end and np.count_nonzero(at) >= _LEAST_SAMPLES:
+            out |= at
+    known = np.isfinite(values)
+    return out & _is_noisy(values[known], out[known], step)
+
+
+def _is_noisy(signal: Array, ends: NDArray[np.bool_], step: float) -> bool:
+    """Whether a force has noise well above its resolution, and no equal values but at its ends."""
+    inner = ~(ends[2:] | ends[1:-1] | ends[:-2])
+    bends = np.diff(signal, 2)[inner]
+    if (
+        len(bends) < _LEAST_SAMPLES
+        or np.mean(np.diff(signal)[~(ends[1:] & ends[:-1])] == 0) > _TIES
+    ):
+        return False
+    alternating = float(np.mean(bends[1:] * bends[:-1] < 0))
+    # The variance of a second difference of white noise is six times that of the noise.
+    return alternating > _JITTER and float(np.std(bends)) > _ABOVE_STEP * step * 6**0.5
 
 
 def _is_cut_off(signal: Array, at: NDArray[np.bool_], level: float) -> bool:

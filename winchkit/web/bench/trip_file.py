@@ -50,7 +50,7 @@ def trip_file(found: Mapping[str, Any], bench: str, folder: Path) -> tuple[str, 
     """File name with the present time (UTC), and text of the run as CSV."""
     name = f"trip-{datetime.now(UTC):%Y%m%d-%H%M%S}.csv"
     path = folder / name
-    write_run(trip_run(found, bench), path)
+    write_run(trip_run(found, bench), path, replace=True)
     text = path.read_text(encoding="utf-8")
     path.unlink()
     return name, text
