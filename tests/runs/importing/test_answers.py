@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from winchkit import import_runs
 from winchkit.cli import main
 from winchkit.errors import RunError, UsageError
 from winchkit.runs import read_run
@@ -136,3 +137,16 @@ def test_a_trace_of_frames_is_reported_by_every_command(tmp_path: Path) -> None:
     for words in (("check",), ("log", "info"), ("import",)):
         _, output = command(*words, path)
         assert "is a trace of CAN frames" in output
+
+
+@pytest.mark.parametrize("column", ["motor_torque=q", "motor_torque=load cell", "tension=tau"])
+def test_a_unit_of_the_file_that_is_none_of_the_channel_is_a_question(
+    tmp_path: Path, column: str
+) -> None:
+    file = tmp_path / "a.csv"
+    rows = "".join(f"{k / 100},{k / 50},{k % 7},{k % 5}\n" for k in range(200))
+    file.write_text(f"time [s],q [rad],tau [Nm],load cell [N]\n{rows}", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"a unit of \w+, and \w+ is a"):
+        import_runs(file, columns=[column])
+    (run,) = import_runs(file, columns=["motor_angle=q", "motor_torque=load cell*0.1"])
+    assert run["motor_torque"].max() == pytest.approx(0.4)

@@ -51,7 +51,8 @@ def permitted(channel: str) -> tuple[str, ...]:
     return _PERMITTED.get(base, () if dimension is None else (dimension,))
 
 
-def _fits(channel: str, dimension: str) -> bool:
+def fits(channel: str, dimension: str) -> bool:
+    """Whether a column in a unit of a dimension may be a channel."""
     return dimension in permitted(channel) or column_dimension(channel) in {"ratio", None}
 
 
@@ -292,7 +293,7 @@ def read_column(text: str) -> ColumnAnswer:
     if unit and unit not in {STAMP, EXCEL} and spelled is None:
         units = ", ".join(UNITS[dimension]) if dimension else "1"
         raise UsageError(f"'{unit}' in '{text}' is no known unit; use one of {units}")
-    if spelled is not None and not _fits(channel, spelled.dimension):
+    if spelled is not None and not fits(channel, spelled.dimension):
         raise UsageError(
             f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
             + ", ".join(UNITS[dimension or "ratio"])

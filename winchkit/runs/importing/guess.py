@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from winchkit.runs.importing.answers import Answers, ColumnAnswer
+from winchkit.runs.importing.answers import Answers, ColumnAnswer, fits
 from winchkit.runs.importing.assignment import (
     Assignment,
     ChosenColumn,
@@ -29,7 +29,9 @@ from winchkit.runs.importing.source_stamps import delays, has_two_clocks, withou
 from winchkit.runs.importing.stored.settling import settle_stored
 from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
-from winchkit.schema.mapping import DATE
+from winchkit.runs.importing.unit_spelling import read_unit
+from winchkit.schema.mapping import CHANNELS, DATE
+from winchkit.units import UNITS
 
 
 def guess_columns(table: ColumnTable, answers: Answers | None = None) -> Guess:
@@ -108,7 +110,7 @@ def _given(table: ColumnTable, answers: Answers) -> tuple[dict[str, ColumnAnswer
     missing: list[Question] = []
     for item in answers.columns:
         column = table.column(item.source) if item.source else None
-        missing += _contradictions(found, column, item)
+        missing += [*_contradictions(found, column, item), *_wrong_unit(column, item)]
         if column is not None and item.constant and item.constant not in table.constants:
             known = ", ".join(f"{k} = {v:g}" for k, v in table.constants.items()) or "none"
             text = f"there is no constant '{item.constant}'; the file has {known}"
@@ -132,6 +134,23 @@ def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
     factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
     source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
     return replace(item, source=source, factor=None, constant="", sign=1.0)
+
+
+def _wrong_unit(column: FileColumn | None, item: ColumnAnswer) -> Iterator[Question]:
+    """Question for a column whose unit in the file is none of the channel, and nothing else is."""
+    if column is None or item.unit or item.factor is not None or item.constant:
+        return
+    spelled = read_unit(column.unit)
+    if spelled is None or fits(item.channel, spelled.dimension):
+        return
+    dimension = CHANNELS.get(item.channel) or "number"
+    text = (
+        f"column '{column.source}' is in {column.unit}, a unit of {spelled.dimension}, and "
+        f"{item.channel} is a {dimension}"
+    )
+    unit = next(iter(UNITS[dimension])) if dimension in UNITS else "UNIT"
+    option = f'--column "{item.channel}=ANOTHER COLUMN"'
+    yield Question(text, (option, f'--column "{item.channel}={item.source} [{unit}]"'))
 
 
 def _contradictions(
