@@ -150,3 +150,8 @@ def test_a_unit_of_the_file_that_is_none_of_the_channel_is_a_question(
         import_runs(file, columns=[column])
     (run,) = import_runs(file, columns=["motor_angle=q", "motor_torque=load cell*0.1"])
     assert run["motor_torque"].max() == pytest.approx(0.4)
+
+
+def test_a_factor_may_stand_before_its_column() -> None:
+    first, last = "motor_torque=-0.12*Iq [N m]", "motor_torque=-Iq*0.12 [N m]"
+    assert read_column(first) == read_column(last)

@@ -242,6 +242,12 @@ def _scale(raw: Array, value: Array) -> float:
     return float(np.ptp(value)) / spread if spread > 0 else math.nan
 
 
+def is_wrong(health: Health) -> bool:
+    """Whether readings are lost, saturated, or stand still where a cell would not."""
+    lost = health.saturated or health.usable < health.readings
+    return bool(lost or health.unique == 1 or _is_stuck(health))
+
+
 def lost_readings(health: Health) -> list[str]:
     """Remarks on readings that are saturated or not usable for another reason."""
     remarks, lost = [], health.readings - health.usable - health.saturated

@@ -85,7 +85,7 @@ def command(
     assert bench is not None, "else UsageError"
     from winchkit.bench.cells.calls import samples_of_readings
     from winchkit.bench.cells.tasks import readings_of
-    from winchkit.calibration.cell.health import examine
+    from winchkit.calibration.cell.health import examine, is_wrong
     from winchkit.cli.core.quantities import quantity
 
     seconds = quantity(duration, "time")
@@ -105,7 +105,7 @@ def command(
         *(f"  ! {remark}" for remark in health.remarks),
     ]
     tell({**record, "flags": flags, "counters": counters}, lines)
-    if health.saturated or health.usable < health.readings or health.unique == 1:
+    if is_wrong(health):
         click.get_current_context().exit(1)
 
 
@@ -118,14 +118,13 @@ def _parameter(context: click.Context, name: str) -> click.Parameter:
 
 def _examine_recording(run: str, column: str | None) -> None:
     """Report on every cell of a file; exit with 1 where its readings are wrong."""
+    from winchkit.calibration.cell.health import is_wrong
     from winchkit.calibration.cell.recordings import recorded_cell_health
 
     found = recorded_cell_health(run, column)
     lines = (line for one in found for line in _lines_of_recorded(one, run))
     tell({"run": run, "cells": [dataclasses.asdict(one) for one in found]}, lines)
-    health = [one.health for one in found]
-    is_wrong = any(h.saturated or h.usable < h.readings or h.unique == 1 for h in health)
-    if is_wrong or any(one.spikes for one in found):
+    if any(one.spikes or is_wrong(one.health) for one in found):
         click.get_current_context().exit(1)
 
 

@@ -299,6 +299,8 @@ def read_column(text: str) -> ColumnAnswer:
             + ", ".join(UNITS[dimension or "ratio"])
         )
     factor = float(_with_point(found["factor"])) if found["factor"] else None
-    constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
-    file = (found["file"] or "").strip()
-    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign, file)
+    source, constant = found["source"], found["constant"] or ""
+    if constant and re.fullmatch(r"\d*[.,]?\d+", source):
+        source, factor, constant = constant, float(_with_point(source)), ""  # the number first
+    sign, file = -1.0 if found["minus"] else 1.0, (found["file"] or "").strip()
+    return ColumnAnswer(channel, source, unit, factor, constant, sign, file)
