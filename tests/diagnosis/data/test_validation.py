@@ -146,6 +146,9 @@ def test_another_winch_is_recognised_by_its_length_and_not_by_its_name() -> None
     other = replace(GROOVED, gearbox=GearboxSpec(10.0))
     with pytest.raises(RunError, match=r"changes by 0\.49 times what profile 'grooved' predicts"):
         validate_runs([GOOD], other)
+    with pytest.raises(RunError, match="in 1 more of the runs") as both:
+        validate_runs([GOOD, made(7)], other)
+    assert len(both.value.faults) == 1
 
 
 def test_notes_count_what_is_missing() -> None:

@@ -46,10 +46,20 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
         raise RunError("no run given")
     faults = [fault for run in runs for fault in _faults(run, profile)] + _duplicates(runs)
     if not faults:
-        faults = [fault for run in runs for fault in _other_winch(run, profile)]
+        faults = _alike([fault for run in runs for fault in _other_winch(run, profile)])
     if faults:
         raise RunError(faults)
     return [note for run in runs for note in _notes(run, profile)]
+
+
+def _alike(faults: Sequence[Fault]) -> list[Fault]:
+    """Faults of one kind as the first of them, with the number of the others."""
+    out = []
+    for key in dict.fromkeys(fault.key for fault in faults):
+        first, *others = (fault for fault in faults if fault.key == key)
+        more = f"; so it is in {len(others)} more of the runs" if others else ""
+        out.append(replace(first, message=first.message + more))
+    return out
 
 
 def without_constants(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
