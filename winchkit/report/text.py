@@ -141,7 +141,7 @@ def step_lines(
     """Every step with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
-    from which further steps are counted only. Returns: lines of at most 80 characters.
+    from which further steps are named only. Returns: lines of at most 80 characters.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
@@ -150,7 +150,9 @@ def step_lines(
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
         if most is not None and lines and len(lines) + len(own) > most:
-            return [*lines, f"… {len(diagnosis.steps) - number + 1} more with --verbose"]
+            left_out = [one.effects[0] for one in diagnosis.steps[number - 1 :]]
+            more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
+            return [*lines, *paragraph(more, "", "  ")]
         lines += own
     return lines
 
