@@ -150,6 +150,8 @@ def test_a_unit_of_the_file_that_is_none_of_the_channel_is_a_question(
         import_runs(file, columns=[column])
     (run,) = import_runs(file, columns=["motor_angle=q", "motor_torque=load cell*0.1"])
     assert run["motor_torque"].max() == pytest.approx(0.4)
+    (run,) = import_runs(file, columns=["motor_angle=q", "motor_torque=tau*q [N m]"])
+    assert run["motor_torque"] == pytest.approx((np.arange(200) % 7) * np.arange(200) / 50)
 
 
 def test_a_factor_may_stand_before_its_column() -> None:

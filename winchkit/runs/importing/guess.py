@@ -129,7 +129,10 @@ def _given(table: ColumnTable, answers: Answers) -> tuple[dict[str, ColumnAnswer
 
 def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
     """An answer with its sign and factor as parts of its expression, which they are of a sum."""
-    if table.column(item.source) is not None or not is_expression(item.source):
+    is_column = item.constant and item.constant not in table.constants
+    if not (is_column and table.column(item.constant) is not None) and (
+        table.column(item.source) is not None or not is_expression(item.source)
+    ):
         return item
     factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
     source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
