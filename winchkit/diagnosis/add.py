@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from winchkit.arguments import require_types
+from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
@@ -166,6 +166,7 @@ def fitted_addition(
     band: float | None = None,
 ) -> FittedAddition:
     """The same as :func:`add`, with the fits."""
+    require_type(effect_id, str, "effect_id")
     require_types(runs, Run, "runs")
     if (by_wing := of_wing("add", profile, band)) is not None:
         found: FittedAddition = by_wing(effect_id, runs, profile, catalogue)
@@ -339,6 +340,7 @@ def remove(
     RunError
         With every fault of every run.
     """
+    require_type(effect_id, str, "effect_id")
     if (by_wing := of_wing("remove", profile, band)) is not None:
         found: Removal = by_wing(effect_id, runs, profile, catalogue)
         return found
