@@ -6,14 +6,16 @@ The model has 1 m for 1 rad; a result that leaves it has ``force`` and ``positio
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from winchkit.effects.effect import Effect
 from winchkit.errors import RunError, UsageError
 from winchkit.schema.linear_axis import linear_words
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 T = TypeVar("T")
@@ -22,7 +24,12 @@ _AS_GIVEN = {"run", "runs", "path", "programme", "profile", "effect", "effects",
 
 
 def in_units_of(profile: WinchProfile, result: T) -> T:
-    """A result with the names and units of a profile: those of a linear axis where it is one."""
+    """A result with the names and units of a profile: those of a linear axis where it is one.
+
+    In the texts of another axis the drum, which it has none, is its output.
+    """
+    if isinstance(profile, AxisProfile) and isinstance(result, str) and not profile.is_linear:
+        return cast(T, re.sub(r"\bdrum(?=\s+(?:angle|turn)\b)", "output", result))
     return _linear(result) if profile.is_linear else result
 
 
