@@ -16,7 +16,6 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_type
 from winchkit.errors import UsageError
-from winchkit.runs.files import refuse_existing
 from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
 from winchkit.runs.recording.log_file import create
@@ -86,10 +85,9 @@ def write_run(run: Run, path: str | Path, *, replace: bool = False) -> None:
     """
     require_type(run, Run, "run")
     kind = kind_for(path)
-    refuse_existing(path_of(path), replace)
     columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
     series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
-    begin = partial(create, path_of(path), replace=True)
+    begin = partial(create, path_of(path), replace=replace)
     clock = time.monotonic
     with kind(path_of(path), columns, run.metadata, clock, begin, is_streamed=False) as writer:
         for row in zip(*series, strict=True):

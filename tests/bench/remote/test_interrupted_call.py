@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from winchkit.bench.remote import client, operations
+from winchkit.bench.remote import client, motion_operations, operation, operations, requests
 from winchkit.bench.remote.client import RemoteStation
 
-CLIENT = {client.__file__, operations.__file__}
+CLIENT = {one.__file__ for one in (client, motion_operations, operation, operations, requests)}
 
 
 class Owner(threading.Thread):

@@ -60,7 +60,9 @@ def put(library: Path, path: str, seed: int, samples: int = 200) -> None:
     angle = np.random.default_rng(seed).normal(size=samples).cumsum()
     about = {"load_mass": "10 kg", "programme": "ladder"}
     (library / path).parent.mkdir(parents=True, exist_ok=True)
-    write_run(Run("x", ticks, {"motor_angle": Channel(angle, "rad")}, about), library / path)
+    write_run(
+        Run("x", ticks, {"motor_angle": Channel(angle, "rad")}, about), library / path, replace=True
+    )
 
 
 def fleet(command: str, library: Path, *arguments: object) -> Result:
@@ -131,7 +133,7 @@ def test_a_log_without_its_end_is_cut(library: Path, tmp_path: Path) -> None:
         assert "was cut: the log has no end" in told, name
 
 
-def test_rows_by_an_old_profile_do_not_stand_beside_new_ones(library: Path, tmp_path: Path) -> None:
+def test_rows_by_an_old_profile_are_not_mixed_with_new_ones(library: Path, tmp_path: Path) -> None:
     profile = tmp_path / "own.toml"
     text = find("profiles", "bench-spiral").read_text()
     profile.write_text(text)

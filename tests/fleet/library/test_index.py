@@ -45,7 +45,7 @@ def a_run(seed: int = 0, **metadata: str) -> Run:
 def put(library: Path, path: str, seed: int = 0, **metadata: str) -> Path:
     file = library / path
     file.parent.mkdir(parents=True, exist_ok=True)
-    write_run(a_run(seed, **metadata), file)
+    write_run(a_run(seed, **metadata), file, replace=True)
     return file
 
 

@@ -243,7 +243,7 @@ def test_numbers_survive_to_the_last_bit(
     assert np.array_equal(
         np.array([first["motor_angle"], first["tension"], first["odd"]]).T, rows, equal_nan=True
     )
-    write_run(first, tmp_path / "copy.csv")
+    write_run(first, tmp_path / "copy.csv", replace=True)
     second = read_run(tmp_path / "copy.csv")
     assert np.array_equal(first.time, second.time)
     assert dict(first.metadata) == dict(second.metadata)

@@ -79,15 +79,18 @@ def complete_file(ctx: click.Context, _param: click.Parameter, typed: str) -> li
     return _files(typed, lambda _path: True)
 
 
+_EFFECT = re.compile(r'^    id="([\w-]+)",$', re.MULTILINE)
+
+
 def complete_effect(
     ctx: click.Context, _param: click.Parameter, typed: str
 ) -> list[CompletionItem]:
-    """Effects of the catalogue: a file of winchkit/effects has the name of its effect."""
+    """Effects of the catalogue, as their files declare them: nothing heavy is imported."""
     from importlib.resources import files
 
     folder = Path(str(files("winchkit"))) / "effects"
-    modules = [path.stem for path in folder.glob("on_*/*.py") if path.stem != "__init__"]
-    return _names((name.replace("_", "-") for name in modules), typed)
+    texts = (path.read_text(encoding="utf-8") for path in folder.glob("on_*/*.py"))
+    return _names((name for text in texts for name in _EFFECT.findall(text)), typed)
 
 
 def complete_effect_of_profile(

@@ -57,7 +57,7 @@ def forget_typed() -> None:
 
 
 def may_ask() -> bool:
-    """Whether somebody can answer: a terminal, and nobody wants JSON."""
+    """Whether an answer can be typed: a terminal, and no JSON is asked for."""
     return not is_json() and sys.stdin.isatty() and sys.stderr.isatty()
 
 

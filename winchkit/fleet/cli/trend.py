@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from winchkit.cli.core.command import ToolCommand
+from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_effect
 from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import json_flag, tell
@@ -20,8 +20,12 @@ from winchkit.errors import UsageError, suggest
     "trend",
     cls=ToolCommand,
     examples=(
-        "winchkit fleet trend . -p bench-spiral --effect cell-gain",
-        "winchkit fleet trend . -p bench-spiral --effect cell-gain --limit cell-gain.gain_error=2%",
+        Example("winchkit fleet trend . -p bench-spiral --effect cell-gain", exit_code=1),
+        Example(
+            "winchkit fleet trend . -p bench-spiral --effect cell-gain "
+            "--limit cell-gain.gain_error=2%",
+            exit_code=1,
+        ),
     ),
 )
 @click.argument("folder", metavar="DIR")

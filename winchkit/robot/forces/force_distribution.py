@@ -34,7 +34,7 @@ class ForceLimits:
     """N."""
 
     def spread(self, count: int) -> tuple[Array, Array]:
-        """Both limits per line; raises UsageError unless 0 <= low < high.
+        """Both limits per line; raises UsageError where low is not below high.
 
         Parameters
         ----------
@@ -48,11 +48,8 @@ class ForceLimits:
         """
         low = np.broadcast_to(np.asarray(self.low, dtype=float), (count,))
         high = np.broadcast_to(np.asarray(self.high, dtype=float), (count,))
-        if not np.all((low >= 0.0) & (low < high)):
-            raise UsageError(
-                f"force limits: low {self.low} N is not below high {self.high} N, or below 0: "
-                "cables only pull"
-            )
+        if not np.all(low < high):
+            raise UsageError(f"force limits: low {self.low} N is not below high {self.high} N")
         return low, high
 
     def between(self, count: int) -> tuple[Array, Array]:

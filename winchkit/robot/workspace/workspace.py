@@ -110,6 +110,7 @@ class CableDemand:
             "rotation speed": (self.rotation_speed, "rad/s"),
             "cable speed": (0.0 if self.cable_speed is None else self.cable_speed, "m/s"),
             "clearance": (self.clearance or 0.0, "m"),
+            "least tension": (0.0 if self.tension is None else self.tension.low, "N"),
         }
         for name, (value, unit) in numbers.items():
             if not np.all(np.asarray(value) >= 0.0):
