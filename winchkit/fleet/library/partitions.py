@@ -145,7 +145,9 @@ class Partitions:
         schema = arrow_schema(path.parent.parent.name)
         wanted = schema if columns is None else pa.schema([schema.field(c) for c in columns])
         try:
-            found = pq.ParquetFile(BytesIO(path.read_bytes())).read(columns=columns)
+            # Small tables: threads save nothing, and may abort the process when it exits.
+            file = pq.ParquetFile(BytesIO(path.read_bytes()))
+            found = file.read(columns=columns, use_threads=False)
             return found.select(wanted.names).cast(wanted)
         except (OSError, pa.ArrowException, KeyError) as error:
             message = f"is no partition of a library ({error}); delete it, and index again"
