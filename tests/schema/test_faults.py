@@ -184,14 +184,3 @@ def test_two_devices_at_one_address(bench: Path) -> None:
 def test_a_bench_without_a_winch(bench: Path) -> None:
     faults = faults_of(bench, 'schema = 1\nkind = "bench"\nbus = {}\nwinch = {}\n')
     assert [(line, key) for line, key, _ in faults] == [(4, "winch")]
-
-
-def test_a_cable_is_no_thicker_than_its_groove(file: Path) -> None:
-    drum = 'kind = "grooved"\nwinding_radius = "60 mm"\ngroove_pitch = "5 mm"'
-    head, tail = 'schema = 1\nkind = "winch"\n', "[gearbox]\nratio = 10\n[reference]\n"
-    text = f'{head}[drum]\n{drum}\n{tail}[cable]\ndiameter = "D mm"\n'
-    file.write_text(text.replace("D", "5"), encoding="utf-8")
-    assert read_any(file)
-    ((_, key, message),) = faults_of(file, text.replace("D", "400"))
-    assert key == "cable.diameter"
-    assert message.endswith("does not fit in grooves of drum.groove_pitch 0.005 m")

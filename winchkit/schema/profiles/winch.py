@@ -207,12 +207,6 @@ class WinchProfile(Plotted, Table):
                 "drum.layer_growth",
                 f"missing; a {drum.kind} drum needs it, or cable.diameter as its default",
             )
-        pitch, diameter = drum.groove_pitch or 0.0, self.cable.diameter or 0.0
-        if drum.kind == "grooved" and 0.0 < pitch < diameter:
-            yield (
-                "cable.diameter",
-                f"{diameter:g} m does not fit in grooves of drum.groove_pitch {pitch:g} m",
-            )
         effects = {table.id for table in self.effect}
         for key, effect in SHORTHANDS.items():
             part, _, name = key.partition(".")
