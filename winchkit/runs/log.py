@@ -116,7 +116,7 @@ def joined(logs: Sequence[Log]) -> Log:
     for before, after in pairwise(logs):
         for topic, samples in before.samples.items():
             later = after.samples[topic].times
-            if len(samples) and len(later) and later[0] <= samples.times[-1]:
+            if len(samples) and len(later) and later[0] < samples.times[-1]:
                 message = (
                     f"begins at {later[0]:.6g} s, before {before.path} ends "
                     f"({samples.times[-1]:.6g} s): the parts of one log follow each other; convert "

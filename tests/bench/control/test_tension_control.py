@@ -204,10 +204,11 @@ def test_a_cable_that_is_slack_at_first_is_wound_in_by_what_its_stiffness_explai
 
 
 @settings(max_examples=6, deadline=None)
-@given(softer=st.floats(1.0, 10.0), present=st.floats(1.0, 60.0), slack=st.floats(0.0, 8e-3))
+@given(softer=st.floats(1.0, 10.0), present=st.floats(1.0, 60.0), slack=st.floats(0.0, 6e-3))
 def test_a_cable_softer_than_its_bound_and_a_little_slack_comes_to_the_tension(
     softer: float, present: float, slack: float
 ) -> None:
+    """Slack of less than the 6 mm that 120 N at 20 kN/m explain; more of it trips, as above."""
     held = Held(half(120.0, travel=0.1), 2e4 / softer, present - slack * 2e4 / softer)
     held.run(40.0)
     assert not held.rig.supervisor.tripped
