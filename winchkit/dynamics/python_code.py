@@ -18,8 +18,7 @@ _MODULE = '''\
 """{title}: written by winchkit export-model; Python without other packages, SI units."""
 
 import math
-from math import {functions}
-
+{functions}
 {constants}
 {helpers}
 
@@ -59,14 +58,15 @@ def python_module(profile: WinchProfile, terms: Sequence[Term]) -> str:
         results = ", ".join(found[: len(outputs)])
     text = "\n".join(body)
     used = set(re.findall(r"\w+", text))
+    called = [name for name in _FUNCTIONS if name in used]
     told = [f"{name}, {unit}" for name, (unit, _) in outputs.items()]
     return _MODULE.format(
-        title=profile.name,
+        title=re.sub(r'["\\]', "", profile.name),
         name=identifier(profile.name).title().replace("_", ""),
         constants="\n".join(
             f"{c.name.upper()} = {c.value!r}  # {c.unit}; {c.source}" for c in step.constants
         ),
-        functions=", ".join(name for name in _FUNCTIONS if name in used) or "pi",
+        functions=f"from math import {', '.join(called)}\n" if called else "",
         helpers="".join(
             f"\n\n{inspect.getsource(one)}" for name, one in _HELPERS.items() if name in used
         ),

@@ -5,6 +5,7 @@ Every fault is reported with its file and column.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -52,11 +53,17 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     return [note for run in runs for note in _notes(run, profile)]
 
 
+_FACTOR = re.compile(r"^changes by \S+")
+"""In which the faults of several runs with one wrong factor differ."""
+
+
 def _alike(faults: Sequence[Fault]) -> list[Fault]:
-    """Faults of one kind as the first of them, with the number of the others."""
+    """The first of the faults that differ in their factor only, with the number of the others."""
+    kinds: dict[tuple[str, str], list[Fault]] = {}
+    for fault in faults:
+        kinds.setdefault((fault.key, _FACTOR.sub("", fault.message)), []).append(fault)
     out = []
-    for key in dict.fromkeys(fault.key for fault in faults):
-        first, *others = (fault for fault in faults if fault.key == key)
+    for first, *others in kinds.values():
         more = f"; so it is in {len(others)} more of the runs" if others else ""
         out.append(replace(first, message=first.message + more))
     return out

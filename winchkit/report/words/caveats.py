@@ -17,7 +17,7 @@ _CAVEATS = {
     "outlying-repeat": "a run differs from its repeats by something that is not recorded: it was "
     "left out",
     "saturated": "the motor torque is cut off at its largest or smallest value: what it was there "
-    "is unknown, and is not compared",
+    "is unknown",
     "noise-floor-implausible": "repeats agree to better than the resolution of an instrument: "
     "errors below the noise of its rounding cannot be excluded",
 }

@@ -36,7 +36,7 @@ _JITTER = 0.5
 white noise has three quarters."""
 _ABOVE_STEP = 3.0
 """Noise in steps of the resolution from which equal values are no matter of rounding."""
-_FORCES = ("motor_torque", "tension", "load", "motor_current")
+_FORCES = ("motor_torque", "tension", "load")
 """Channels whose instruments have noise at rest as well: an encoder at rest repeats its value."""
 _BEFORE = 6
 """Samples before a level from which its slope is continued: few, since a motion bends."""
@@ -59,6 +59,7 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
     values = values[np.isfinite(values)]
     if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0:
         return
+    kind = name.rpartition(".")[2]
     for sign, word in ((1.0, "largest"), (-1.0, "smallest")):
         signal = sign * values
         level = float(signal.max())
@@ -66,9 +67,7 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
         count = int(np.count_nonzero(at))
         if count < _LEAST_SAMPLES or level == 0:
             continue
-        noisy = name.rpartition(".")[2] in _FORCES and _is_noisy(
-            signal, at | (signal == signal.min()), step
-        )
+        noisy = kind in _FORCES and _is_noisy(signal, at | (signal == signal.min()), step)
         if not noisy and not _is_cut_off(signal, at, level):
             continue
         if np.ptp(values) < _LEAST_LEVELS * step:
@@ -76,7 +75,12 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
         limit = quantity(sign * level, run.channels[name].unit)
         text = (
             f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
-            "instrument or the logger saturates; larger errors there are no effect of the winch"
+            "instrument or the logger saturates; "
+            + (
+                "these samples are not compared"
+                if noisy and kind == "motor_torque"
+                else "larger errors there are no effect of the winch"
+            )
         )
         yield Finding(SATURATED, run.name, name, count / len(values), text)
 
