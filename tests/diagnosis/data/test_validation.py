@@ -149,6 +149,10 @@ def test_another_winch_is_recognised_by_its_length_and_not_by_its_name() -> None
     with pytest.raises(RunError, match="in 1 more of the runs") as both:
         validate_runs([GOOD, made(7)], other)
     assert len(both.value.faults) == 1
+    turned = with_channel(made(8), "cable_length", -made(8)["cable_length"])
+    with pytest.raises(RunError) as mixed:
+        validate_runs([GOOD, turned], other)
+    assert len(mixed.value.faults) == 2, "a sign is not said to be a factor"
 
 
 def test_notes_count_what_is_missing() -> None:
