@@ -14,15 +14,16 @@ WEIGHT, INERTIA, FRICTION, LIMIT = 1.96, 0.02, 0.3, 1.5
 
 
 @pytest.mark.slow
-def test_values_at_the_limit_of_a_drive_are_not_compared(tmp_path: Path) -> None:
-    """A pendulum: nearly half of its torque is beyond the limit, and the weight is right."""
+@pytest.mark.parametrize("step", [1e-6, 0.02, 0.1])
+def test_values_at_the_limit_of_a_drive_are_not_compared(tmp_path: Path, step: float) -> None:
+    """A pendulum, nearly half of whose torque is beyond the limit, and that is rounded."""
     time = np.arange(0.0, 20.0, 0.01)
     angle = 1.9 * np.sin(1.3 * time) + 0.9 * np.sin(2.9 * time + 1.0)
     rate = np.gradient(angle, time)
     torque = WEIGHT * np.sin(angle) + INERTIA * np.gradient(rate, time) + FRICTION * np.sign(rate)
     noisy = torque + np.random.default_rng(3).normal(0.0, 0.01, len(time))
-    cut = np.clip(noisy, -LIMIT, LIMIT)
-    assert np.mean(np.abs(cut) == LIMIT) > 0.3
+    cut = step * np.round(np.clip(noisy, -LIMIT, LIMIT) / step)
+    assert np.mean(np.abs(cut) > LIMIT - step / 2) > 0.3
     run = Run(
         "r", time, {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(cut, "N m")}
     )

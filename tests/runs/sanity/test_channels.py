@@ -290,6 +290,42 @@ def test_a_smooth_signal_is_cut_off_at_a_slope() -> None:
     assert found(run_of(np.minimum(100 * np.sin(time), 60.0)), "saturated")
 
 
+def weight(seed: int, noise: float) -> Array:
+    """Torque of a pendulum that swings by 140 degrees, of 2 N m, with noise, every 10 ms."""
+    random = np.random.default_rng(seed)
+    time, phase = np.arange(2000) * 0.01, random.uniform(0, 6)
+    angle = 1.8 * np.sin(1.3 * time + phase) + 0.7 * np.sin(2.9 * time)
+    return 2.0 * np.sin(angle) + random.normal(0.0, noise, len(time))
+
+
+@given(SEEDS, st.floats(0.001, 0.1), st.floats(0.001, 0.02), st.floats(1.2, 1.6))
+@settings(max_examples=60, deadline=None)
+def test_a_steep_torque_is_cut_off_whatever_its_resolution(
+    seed: int, step: float, noise: float, limit: float
+) -> None:
+    rounded = step * np.round(weight(seed, noise) / step)
+    level = step * round(limit / step)
+    time = np.arange(len(rounded)) * 0.01
+    assert not inspect_run(_drive(time, 90 * time, rounded)).outliers
+    cut = np.clip(rounded, -level, level)
+    mask = inspect_run(_drive(time, 90 * time, cut)).outliers["motor_torque"]
+    assert np.array_equal(mask, np.abs(cut) > level - step / 2)
+
+
+@given(SEEDS, st.floats(0.02, 0.2))
+@settings(max_examples=60, deadline=None)
+def test_a_torque_that_is_constant_by_itself_is_not_cut_off(seed: int, step: float) -> None:
+    """Coulomb friction, and the inertia of a motion with trapezoidal velocity, of coarse values."""
+    time = np.arange(3000) * 0.01
+    noise = np.random.default_rng(seed).normal(0.0, 0.1 * step, len(time))
+    for torque in (
+        np.sign(np.sin(time)) + 0.2 * np.sin(3 * time),
+        np.interp(time % 8, [0.5, 0.7, 2, 2.2, 4.5, 4.7, 6, 6.2], [0, 2, 2, 0, 0, -2, -2, 0]),
+    ):
+        values = step * np.round((torque + noise) / step)
+        assert not inspect_run(_drive(time, 90 * time, values)).outliers
+
+
 def test_rest_at_the_end_of_a_smooth_travel_is_no_saturation() -> None:
     phase = np.clip(np.arange(COUNT) / RATE - 5, 0, np.pi)
     assert not found(run_of(2 - np.cos(phase), "cable_length", "m"), "saturated")

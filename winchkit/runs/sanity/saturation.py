@@ -29,8 +29,6 @@ _DITHERED = 12
 """Longest repetition elsewhere of a channel whose noise is not small against its resolution."""
 _LEAST_LEVELS = 8
 """Levels below which the extreme of a quantised channel is one of the few values that it has."""
-_OVERSHOOT = 3.0
-"""Steps by which a continued slope would pass the level: below, it could have ended there."""
 _JITTER = 0.5
 """Share of second differences that alternate from which a channel has noise on a slope as well:
 white noise has three quarters."""
@@ -38,8 +36,12 @@ _ABOVE_STEP = 3.0
 """Noise in steps of the resolution from which equal values are no matter of rounding."""
 _FORCES = ("motor_torque", "tension", "load")
 """Channels whose instruments have noise at rest as well: an encoder at rest repeats its value."""
-_BEFORE = 6
-"""Samples before a level from which its slope is continued: few, since a motion bends."""
+_RISE, _RISE_SAMPLES = 4.0, 3
+"""Steps of the resolution and of the time by which a signal must rise before a level, so that
+neither shapes the rise by more than a quarter."""
+_JUMP, _KINK, _PARABOLA = 1.5, 3.0, 5.0
+"""Bounds of the ratio of a signal's rises over twice and once a time before a level: one at a jump,
+two at a slope that ends there, four at the end of a parabola."""
 
 
 def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
@@ -49,54 +51,56 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
     -----
     Continuous noise has no two equal values: an extreme that repeats is a limit. Values of a coarse
     resolution repeat, but three times as long as elsewhere only at a limit; with a resolution far
-    above the noise nothing can be concluded. A channel without
-    noise may rest at its extreme, but then approaches it slowly: there, the linear extrapolation of
-    the two samples before must exceed the extreme by three times the second differences before it.
-    A force with noise on its slopes has it at its extreme too. An extreme of zero is that of an
-    instrument at rest.
+    above the noise nothing can be concluded. A channel without noise may rest at its extreme, but
+    then approaches it slowly, and a friction jumps to it: a limit ends a slope. A force with noise
+    on its slopes has it at its extreme too. An extreme of zero is that of an instrument at rest.
     """
-    values = run[name]
-    values = values[np.isfinite(values)]
-    if len(values) < _LEAST_SAMPLES or np.ptp(values) == 0:
-        return
-    kind = name.rpartition(".")[2]
-    for sign, word in ((1.0, "largest"), (-1.0, "smallest")):
-        signal = sign * values
-        level = float(signal.max())
-        at = signal >= level - 1e-9 * float(np.ptp(values))
-        count = int(np.count_nonzero(at))
-        if count < _LEAST_SAMPLES or level == 0:
-            continue
-        noisy = kind in _FORCES and _is_noisy(signal, at | (signal == signal.min()), step)
-        if not noisy and not _is_cut_off(signal, at, level):
-            continue
-        if np.ptp(values) < _LEAST_LEVELS * step:
-            return
-        limit = quantity(sign * level, run.channels[name].unit)
+    kind, values = name.rpartition(".")[2], run[name]
+    known = np.isfinite(values)
+    for sign, at in _limits(values[known], step, is_force=kind in _FORCES):
+        limit = quantity(sign * float((sign * values[known]).max()), run.channels[name].unit)
         text = (
-            f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
-            "instrument or the logger saturates; "
+            f"{share(float(at.mean()))} of the samples are at the "
+            f"{'largest' if sign > 0 else 'smallest'} value, {limit}: the instrument or the "
+            "logger saturates; "
             + (
                 "these samples are not compared"
-                if noisy and kind == "motor_torque"
+                if kind == "motor_torque"
                 else "larger errors there are no effect of the winch"
             )
         )
-        yield Finding(SATURATED, run.name, name, count / len(values), text)
+        yield Finding(SATURATED, run.name, name, float(at.mean()), text)
 
 
-def at_limit(values: Array, step: float) -> NDArray[np.bool_]:
-    """Samples of a force with noise at an extreme that repeats and is not zero, (n,).
+def at_limit(torque: Array, step: float) -> NDArray[np.bool_]:
+    """Samples at which a torque of resolution ``step`` is cut off, (n,)."""
+    out = np.zeros(len(torque), dtype=bool)
+    known = np.isfinite(torque)
+    for _, at in _limits(torque[known], step, is_force=True):
+        out[known] |= at
+    return out
 
-    None of a force without noise: a computed friction has the same value in all of its motion.
-    """
-    out = np.zeros(len(values), dtype=bool)
-    for end in (np.nanmin(values), np.nanmax(values)):
-        at = values == end
-        if end and np.count_nonzero(at) >= _LEAST_SAMPLES:
-            out |= at
-    known = np.isfinite(values)
-    return out & _is_noisy(values[known], out[known], step)
+
+def _limits(
+    values: Array, step: float, *, is_force: bool
+) -> Iterator[tuple[float, NDArray[np.bool_]]]:
+    """Each end at which values are cut off: 1 for the largest or -1, and the samples there."""
+    if len(values) < _LEAST_SAMPLES or np.ptp(values) <= _LEAST_LEVELS * step:
+        return
+    found = []
+    for sign in (1.0, -1.0):
+        signal = sign * values
+        at = signal >= signal.max() - 1e-9 * np.ptp(values)
+        if np.count_nonzero(at) < _LEAST_SAMPLES or signal.max() == 0:
+            continue
+        ends = at | (signal == signal.min())
+        noisy = is_force and _is_noisy(signal, ends, step)
+        found.append((sign, at, noisy or _is_cut_off(signal, at, ends, step)))
+    # A drive has one limit for both directions: what is seen at one end holds at the other.
+    is_symmetric = is_force and abs(values.max() + values.min()) <= 1e-9 * np.ptp(values)
+    for sign, at, is_cut_off in found:
+        if is_cut_off or (is_symmetric and any(other for _, _, other in found)):
+            yield sign, at
 
 
 def _is_noisy(signal: Array, ends: NDArray[np.bool_], step: float) -> bool:
@@ -110,35 +114,46 @@ def _is_noisy(signal: Array, ends: NDArray[np.bool_], step: float) -> bool:
         return False
     alternating = float(np.mean(bends[1:] * bends[:-1] < 0))
     # The variance of a second difference of white noise is six times that of the noise.
-    return alternating > _JITTER and float(np.std(bends)) > _ABOVE_STEP * step * 6**0.5
+    return alternating > _JITTER and bool(np.std(bends) > _ABOVE_STEP * step * 6**0.5)
 
 
-def _is_cut_off(signal: Array, at: NDArray[np.bool_], level: float) -> bool:
-    steps = np.diff(signal)
-    between = at[1:] & at[:-1]
-    opposite = signal == signal.min()
-    elsewhere = (steps == 0) & ~between & ~(opposite[1:] & opposite[:-1])
-    changing = steps[steps != 0]
+def _is_cut_off(signal: Array, at: NDArray[np.bool_], ends: NDArray[np.bool_], step: float) -> bool:
+    """Whether values stay at their largest by more than rounding and a bend of the signal do."""
+    steps, between = np.diff(signal), ends[1:] & ends[:-1]
+    elsewhere = (steps == 0) & ~between
+    changing = steps[(steps != 0) & ~between]
     alternating = np.count_nonzero(changing[1:] * changing[:-1] < 0)
-    if alternating > _ALTERNATING * len(changing):
-        if np.count_nonzero(elsewhere) < _TIES * len(signal):
-            return True
-        usual = _longest(elsewhere)
-        return usual <= _DITHERED and _longest(between) > max(_LONGEST, _TIMES * usual)
-    begins = np.flatnonzero(between & ~np.append(False, between[:-1]))
-    beyond = [_overshoot(signal, int(begin), level) for begin in begins if begin >= _BEFORE]
-    return len(beyond) > 0 and float(np.median(beyond)) > _OVERSHOOT
+    is_alternating = bool(alternating > _ALTERNATING * len(changing))
+    if is_alternating and np.mean(elsewhere) < _TIES:
+        return True
+    usual = _longest(elsewhere)
+    if _longest(at) <= max(_LONGEST, _TIMES * usual):
+        return False
+    return (is_alternating and usual <= _DITHERED) or _ends_slopes(signal, at, step)
+
+
+def _ends_slopes(signal: Array, at: NDArray[np.bool_], step: float) -> bool:
+    """Whether the stretches at the largest value mostly end a slope, before and after them.
+
+    A parabola that stays within one step for a stretch is three steps lower half a stretch before.
+    """
+    kinks = []
+    for values, flags in ((signal, at), (signal[::-1], at[::-1])):
+        for begin, length in zip(*_stretches(flags), strict=True):
+            rise = values[begin] - values[:begin][::-1]
+            high = _RISE_SAMPLES + np.flatnonzero(rise[_RISE_SAMPLES:] > _RISE * step)
+            if length > _LONGEST and len(high) and 2 * high[0] + 1 < len(rise):
+                ratio = rise[2 * high[0] + 1] / rise[high[0]]
+                if ratio < _PARABOLA:
+                    kinks.append(_JUMP < ratio < _KINK and high[0] < length / 2)
+    return len(kinks) > 0 and float(np.mean(kinks)) > 1 / 2
+
+
+def _stretches(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """First index and length of each sequence of true flags."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return edges[::2], edges[1::2] - edges[::2]
 
 
 def _longest(flags: NDArray[np.bool_]) -> int:
-    """Length of the longest sequence of true flags."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
-
-
-def _overshoot(signal: Array, begin: int, level: float) -> float:
-    """Extrapolation beyond the extreme, in the largest second difference just before it."""
-    before = signal[begin - _BEFORE : begin]
-    usual = float(np.abs(np.diff(before, 2)).max())
-    beyond = float(2 * before[-1] - before[-2] - level)
-    return beyond / usual if usual > 0 else (np.inf if beyond > 0 else 0.0)
+    return int(np.max(_stretches(flags)[1], initial=0))
