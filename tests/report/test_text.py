@@ -152,13 +152,13 @@ def test_doubts_stand_under_their_step_and_nowhere_else() -> None:
 
 def test_rivals_are_shown_with_the_run_that_separates_them() -> None:
     runs = (
-        NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, three loads", 0.93),
+        NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, twice the load", 0.93),
         NextRun(("pulley-coulomb", "pulley-capstan"), "change a wrap angle", float("nan")),
     )
     found = saying(diagnosis_of("explained", FRICTION, next_runs=runs))
     short = " ".join(report_text(found).split())
     assert "? these runs cannot distinguish it from pulley-capstan" in short
-    assert "To decide between pulley-coulomb and pulley-capstan: full stroke, three loads" in short
+    assert "To decide between pulley-coulomb and pulley-capstan: full stroke, twice the load" in short
     long = report_text(found, verbose=True)
     assert "pulley-coulomb / pulley-capstan  0.1° between signatures" in long
     assert "change a wrap angle" in [line.rpartition(": ")[2] for line in long.splitlines()]

@@ -40,6 +40,8 @@ class WinchPlan(Plan):
     """Operating range of the programmes."""
     offers: tuple[Offer, ...]
     """Programmes with their time and power, the best first."""
+    repeats: int
+    """Runs of each: two where the runs so far have no repeat, which gives the noise."""
 
     @property
     def inseparable(self) -> list[tuple[Term, Term]]:
@@ -48,7 +50,9 @@ class WinchPlan(Plan):
 
     def programme(self, name: str) -> Programme:
         """The best motion programme, for ``winchkit run``."""
-        return programme_of(self.dataset, self.offers[0].kind, name, self.operating_range)
+        return programme_of(
+            self.dataset, self.offers[0].kind, name, self.operating_range, self.repeats
+        )
 
     def to_json(self) -> dict[str, Any]:
         """JSON of ``winchkit plan --json``, without the file written."""
@@ -103,12 +107,14 @@ def plan(
     dataset = regression.dataset
     allowed = range_of_runs(dataset) if limits is None else range_of_limits(dataset, limits)
     effects = list((catalogue or load_catalogue()).of_winches())
+    repeats = 1 if answer.result.noise.from_repeats else 2
     found = offers(
         regression,
         answer.pairs,
         noise,
         effects,
         threshold=answer.threshold,
+        repeats=repeats,
         operating_range=allowed,
     )
-    return WinchPlan(answer.pairs, dataset, allowed, tuple(found))
+    return WinchPlan(answer.pairs, dataset, allowed, tuple(found), repeats)

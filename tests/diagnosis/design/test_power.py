@@ -71,7 +71,7 @@ def test_cable_and_frame_are_distinguished_by_loads_over_the_stroke() -> None:
 
 
 def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
-    """λ of 16 is no chance, but too little to be named among forty: three loads show more of it."""
+    """λ of 16 is no chance, but too little to be named among forty: twice the load shows more of it."""
     regression = TimeSeriesRegression(dataset())
     frame = [CATALOGUE["frame-compliance"]]
     strength = separation(regression, _usual("frame-compliance"), None, NOISE)
@@ -81,7 +81,7 @@ def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
             o.kind.name: o.shows
             for o in plan_offers(regression, [], noise, frame, threshold=threshold)
         }
-        assert shows["full stroke, three loads"] == shown
+        assert shows["full stroke, twice the load"] == shown
     assert BAR.power((np.sqrt(BAR.required_ss(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(
         0.9, 0.01
     )
@@ -105,7 +105,7 @@ def test_warmth_is_distinguished_by_warming_up_and_by_waiting() -> None:
         o.kind.name: o.powers[0] for o in plan_offers(regression, [pair], sizes, [], threshold=BAR)
     }
     assert power["full stroke, warmed up by 15 K"] > 0.9
-    assert power["one load at five lengths, with holds"] > 0.9
+    assert power["five lengths with holds"] > 0.9
 
 
 @pytest.mark.parametrize(

@@ -145,9 +145,9 @@ def test_what_would_change_the_verdict(verdict: str, text: str) -> None:
 
 
 def test_a_run_that_decides_comes_with_its_power() -> None:
-    run = NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, three loads", 0.93)
+    run = NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, twice the load", 0.93)
     assert changes_text(diagnosis_of("explained", FRICTION, next_runs=(run,))) == (
-        "To decide between pulley-coulomb and pulley-capstan: full stroke, three loads "
+        "To decide between pulley-coulomb and pulley-capstan: full stroke, twice the load "
         "(power 93 %)."
     )
 

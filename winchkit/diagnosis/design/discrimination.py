@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import chndtr
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, simulated
+from winchkit.diagnosis.design.programmes import candidates, range_of_runs
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -56,13 +56,12 @@ def next_runs(
     if not pairs:
         return ()
     out: list[NextRun] = []
-    simulated_programmes = [
-        (kind, simulated(regression.dataset, kind)) for kind in CANDIDATE_PROGRAMMES
-    ]
+    dataset = regression.dataset
+    programmes = list(candidates(dataset, range_of_runs(dataset)))
     for first, second in pairs:
         offers, known = [], information_of(regression, first, second, noise)
-        for kind, programme in simulated_programmes:
-            minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
+        for kind, programme in programmes:
+            minutes = programme.dataset.recordings[0].signals.time[-1] / 60
             noncentrality = separation(programme, first, second, noise, known=known)
             offers.append((noncentrality / minutes, power_of(noncentrality), kind.name))
         # Of programmes with equal power the one with the largest λ per minute comes first.

@@ -15,11 +15,10 @@ from winchkit.diagnosis.design.discrimination import (
     separation,
 )
 from winchkit.diagnosis.design.programmes import (
-    CANDIDATE_PROGRAMMES,
     CandidateProgramme,
     OperatingRange,
+    candidates,
     range_of_runs,
-    simulated,
     usual_temperature,
 )
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -32,8 +31,6 @@ _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
 _LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0
 """Time of an operator to change a load, and to warm the machine, minutes."""
-_REPEATS = 2
-"""Runs of each proposed programme; theory: the smallest number that gives pure error."""
 _WEIGHT_STEP = 0.5
 """Loads are proposed in steps of this, kg; convention: weights at hand."""
 
@@ -44,7 +41,7 @@ class Offer:
 
     kind: CandidateProgramme
     minutes: float
-    """Motion and the operator's work, both repeats."""
+    """Motion of all repeats, and the operator's work."""
     powers: tuple[float, ...]
     """Power to separate each pair."""
     shows: tuple[str, ...]
@@ -87,11 +84,13 @@ def offers(
     effects: Sequence[Effect],
     *,
     threshold: DetectionThreshold,
+    repeats: int = 2,
     operating_range: OperatingRange | None = None,
 ) -> list[Offer]:
     """Candidate programmes within an operating range, best first.
 
-    ``noise``: rms per output, SI. ``operating_range``: None for that of the runs so far.
+    ``noise``: rms per output, SI. ``repeats``: runs of each. ``operating_range``: None for that of
+    the runs so far.
     """
     dataset = regression.dataset
     operating_range = operating_range or range_of_runs(dataset)
@@ -106,12 +105,11 @@ def offers(
     ]
     known_pairs = [(a, b, information_of(regression, a, b, noise)) for a, b in pairs]
     out = []
-    for kind in CANDIDATE_PROGRAMMES:
-        simulated_runs = simulated(dataset, kind, operating_range)
-        motion = sum(r.signals.time[-1] for r in simulated_runs.dataset.recordings) / 60
-        minutes = _REPEATS * (motion + _operator_minutes(kind, dataset))
+    for kind, run in candidates(dataset, operating_range):
+        motion = run.dataset.recordings[0].signals.time[-1] / 60
+        minutes = repeats * motion + _operator_minutes(kind)
         powers = tuple(
-            power_of(separation(simulated_runs, a, b, noise, known=known, repeats=_REPEATS))
+            power_of(separation(run, a, b, noise, known=known, repeats=repeats))
             for a, b, known in known_pairs
         )
         shows = tuple(
@@ -121,7 +119,7 @@ def offers(
                 threshold,
                 term,
                 known.residual_ss
-                + separation(simulated_runs, term, None, noise, known=known, repeats=_REPEATS),
+                + separation(run, term, None, noise, known=known, repeats=repeats),
             )
         )
         out.append(Offer(kind, minutes, powers, shows))
@@ -149,26 +147,25 @@ def programme_of(
     kind: CandidateProgramme,
     name: str,
     operating_range: OperatingRange | None = None,
+    repeats: int = 2,
 ) -> Programme:
-    """Motion programme of a kind for ``winchkit run``, repeated twice.
+    """Motion programme of a kind for ``winchkit run``.
 
     ``operating_range``: None for that of the runs so far.
     """
     operating_range = operating_range or range_of_runs(dataset)
     steps: list[ProgrammeStep] = []
-    for rise in kind.temperature_rises if _has_temperature(dataset) else (0.0,):
-        if len(kind.temperature_rises) > 1:
-            steps += _temperature_step(dataset, rise)
-        for load in kind.loads:
-            steps += _load_step(operating_range.load(load))
-            steps.append(_move_step(operating_range.low, operating_range.fastest))
-            for share, speed in kind.moves:
-                steps += [
-                    _move_step(operating_range.at(share), speed * operating_range.fastest),
-                    ProgrammeStep(hold=kind.hold),
-                ]
+    if kind.temperature_rise:
+        steps += _temperature_step(dataset, kind.temperature_rise)
+    steps += _load_step(operating_range.load(kind.load))
+    steps.append(_move_step(operating_range.low, operating_range.fastest))
+    for share, speed in kind.moves:
+        steps += [
+            _move_step(operating_range.at(share), speed * operating_range.fastest),
+            ProgrammeStep(hold=kind.hold),
+        ]
     about = f"{kind.name}; proposed from {len(dataset.recordings)} runs of {dataset.profile.name}"
-    return Programme(name, tuple(steps), repeat=_REPEATS, description=about)
+    return Programme(name, tuple(steps), repeat=repeats, description=about)
 
 
 def _temperature_step(dataset: Dataset, rise: float) -> list[ProgrammeStep]:
@@ -189,19 +186,15 @@ def _load_step(mass: float | None) -> list[ProgrammeStep]:
     return [ProgrammeStep(ask=f"hang the {target:g} kg load", load_mass=target)]
 
 
-def _operator_minutes(kind: CandidateProgramme, dataset: Dataset) -> float:
-    """Time of the operator's work in one repeat, minutes."""
-    warmings = len(kind.temperature_rises) - 1 if _has_temperature(dataset) else 0
-    hangs = len(kind.loads) if len(kind.loads) > 1 else 0
-    return warmings * _WARMING_MINUTES + hangs * _LOADING_MINUTES
+def _operator_minutes(kind: CandidateProgramme) -> float:
+    """Time of the operator's work, minutes."""
+    return (_LOADING_MINUTES if kind.load != 1 else 0.0) + (
+        _WARMING_MINUTES if kind.temperature_rise else 0.0
+    )
 
 
 def _move_step(length: float, speed: float) -> ProgrammeStep:
     return ProgrammeStep(to=round(length, 3), speed=float(f"{max(speed, 1e-3):.2g}"))
-
-
-def _has_temperature(dataset: Dataset) -> bool:
-    return usual_temperature(dataset) is not None
 
 
 def _usual(effects: Sequence[Effect], regression: TimeSeriesRegression) -> list[Term]:

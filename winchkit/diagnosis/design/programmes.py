@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,15 +27,15 @@ _RESERVE = 1.5
 
 @dataclass(frozen=True)
 class CandidateProgramme:
-    """A candidate programme: moves within the stroke, loads, temperatures."""
+    """A candidate programme: moves within the stroke with a load at a temperature, one run."""
 
     name: str
     moves: tuple[tuple[float, float], ...]
     """Target (share of the stroke) and speed (share of the highest speed) of each move."""
-    loads: tuple[float, ...] = (1.0,)
-    """In units of the mean load so far; one run each."""
-    temperature_rises: tuple[float, ...] = (0.0,)
-    """Above the mean temperature so far, K; one run each."""
+    load: float = 1.0
+    """In units of the mean load so far."""
+    temperature_rise: float = 0.0
+    """Above the mean temperature so far, K."""
     hold: float = 0.5
     """Rest after each move, s."""
 
@@ -42,13 +43,10 @@ class CandidateProgramme:
 _THERE_AND_BACK = ((1.0, 1.0), (0.0, 1.0))
 """Moves of a full stroke: position as share of the stroke, speed as share of the highest;
 convention."""
-CANDIDATE_PROGRAMMES = (
-    CandidateProgramme("full stroke, one load", _THERE_AND_BACK),
-    CandidateProgramme("full stroke, three loads", _THERE_AND_BACK, loads=(0.5, 1.0, 2.0)),
+_MOTIONS = (
+    CandidateProgramme("full stroke", _THERE_AND_BACK),
     CandidateProgramme(
-        "one load at five lengths, with holds",
-        tuple((x, 0.5) for x in (1, 0.75, 0.5, 0.25, 0)),
-        hold=5.0,
+        "five lengths with holds", tuple((x, 0.5) for x in (1, 0.75, 0.5, 0.25, 0)), hold=5.0
     ),
     CandidateProgramme(
         "speed ladder, both directions",
@@ -58,11 +56,19 @@ CANDIDATE_PROGRAMMES = (
         "short reversals, slow and fast",
         tuple((0.5 + 0.01 * k * (-1) ** k, s) for s in (0.02, 0.3) for k in range(1, 6)),
     ),
-    CandidateProgramme(
-        "full stroke, warmed up by 15 K", _THERE_AND_BACK, temperature_rises=(0.0, 15.0)
-    ),
 )
-"""Six candidate programmes: moves, loads, temperatures, holds; rule of thumb."""
+"""Four motions that excite friction, elasticity, creep and the drum; rule of thumb."""
+_LOADS = {"": 1.0, ", half the load": 0.5, ", twice the load": 2.0}
+CANDIDATE_PROGRAMMES = (
+    *(
+        replace(motion, name=motion.name + words, load=load)
+        for motion in _MOTIONS
+        for words, load in _LOADS.items()
+    ),
+    CandidateProgramme("full stroke, warmed up by 15 K", _THERE_AND_BACK, temperature_rise=15.0),
+)
+"""Each motion with each load, and one after warming up: every candidate is one run, so that what is
+hung or warmed is a choice as the motion is."""
 
 
 @dataclass(frozen=True)
@@ -129,20 +135,30 @@ def usual_temperature(dataset: Dataset) -> float | None:
     return float(np.mean([np.mean(t) for t in known if t is not None]))
 
 
+def candidates(
+    dataset: Dataset, operating_range: OperatingRange
+) -> Iterator[tuple[CandidateProgramme, TimeSeriesRegression]]:
+    """Each programme that these channels can tell from others, with the regression of its run.
+
+    Loads are a choice where the load is known, temperatures where there is a thermometer.
+    """
+    temperature = usual_temperature(dataset)
+    for kind in CANDIDATE_PROGRAMMES:
+        if (kind.load == 1 or operating_range.mass is not None) and (
+            not kind.temperature_rise or temperature is not None
+        ):
+            yield kind, simulated(dataset, kind, operating_range)
+
+
 def simulated(
     dataset: Dataset, kind: CandidateProgramme, operating_range: OperatingRange | None = None
 ) -> TimeSeriesRegression:
-    """Regression problem of simulated runs of a kind of programme, on the nominal model."""
+    """Regression problem of the simulated run of a programme, on the nominal model."""
     usual = usual_temperature(dataset)
     operating_range = operating_range or range_of_runs(dataset)
-    runs = []
-    for load in kind.loads:
-        for rise in kind.temperature_rises if usual is not None else (0.0,):
-            temperature = None if usual is None else usual + rise
-            runs.append(
-                _run(dataset, kind, operating_range, operating_range.load(load), temperature)
-            )
-    return TimeSeriesRegression(assemble(runs, dataset.profile))
+    temperature = None if usual is None else usual + kind.temperature_rise
+    run = _run(dataset, kind, operating_range, operating_range.load(kind.load), temperature)
+    return TimeSeriesRegression(assemble([run], dataset.profile))
 
 
 def _run(

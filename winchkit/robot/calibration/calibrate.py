@@ -291,6 +291,8 @@ def calibrate(
         before, wrong = wrong, gross_errors(own, chosen.solution.state.values, chosen.weights)
         if np.array_equal(before, wrong):
             break
+    # Small rotations in another convention are hidden by the errors of the nominal geometry.
+    refuse_mistakes(chosen.equations.robot_at(chosen.solution.state.values), fit[~wrong])
     equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
     ratios = ratios_of(equations, solution)

@@ -4,7 +4,8 @@ A cable that reaches its pulley from the other side leaves it on the other side,
 same as an exit point two pulley radii away: a fit imitates it by exit points, and is then wrong by
 tenths of a millimetre. The direction is one of two, so that both are fitted: all axes reversed, and
 each alone, with the standard deviations of the fit; the best one again with its own standard
-deviations. This is repeated from the best until no other one explains the poses better.
+deviations. This is repeated from the best until no other one explains the poses better. A single
+reversed axis is no more evident than the geometry that imitates it: several are named together.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import Mask, solve
 from winchkit.robot.identification.equations import RobotEquations, started
 
+_EVIDENCE = 45.0
+"""Difference of criteria from which axes are named together: twice the largest of 200 robots with
+right axes. One axis gives 10 to 20: alone it cannot be told from exit points, and does no harm."""
+
 
 def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) -> tuple[str, ...]:
     """Names of the lines whose swivel axes point the other way, by the end of a calibration."""
@@ -31,7 +36,7 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
     lines = np.flatnonzero(best.equations.robot.geometry.swivel_radius > 0)
     if not len(lines) or "closure" not in best.equations.kinds:
         return ()
-    turned, every = np.zeros(len(names), dtype=bool), np.arange(len(names))
+    first, turned, every = best, np.zeros(len(names), dtype=bool), np.arange(len(names))
     for _ in lines:
         trials = [turned ^ np.isin(every, own) for own in (lines, *lines[:, None])]
         trials = [trial for trial in trials if np.any(trial)]
@@ -41,6 +46,8 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
         if not found.with_prior < best.with_prior - DELTA_CHI_SQUARE:
             break
         best, turned = found, trial
+    if not best.with_prior < first.with_prior - _EVIDENCE:
+        return ()
     return tuple(name for name, own in zip(names, turned, strict=True) if own)
 
 
