@@ -52,6 +52,7 @@ from winchkit.diagnosis.steps import (
     steps_of,
     with_standing,
 )
+from winchkit.diagnosis.verdict.compensation import with_compensations
 from winchkit.diagnosis.verdict.decision import (
     MOSTLY,
     OutputEvidence,
@@ -63,7 +64,10 @@ from winchkit.diagnosis.verdict.decision import (
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.laws import with_first_members, with_simpler_law
-from winchkit.diagnosis.verdict.open_law import better_curve, predictable_share
+from winchkit.diagnosis.verdict.open_law import (
+    open_law,
+    predictable_share,
+)
 from winchkit.diagnosis.verdict.profile_values import file_model, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.linear_axis import catalogue_of
@@ -329,6 +333,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         *refitted_steps(engine, found, file, outputs, spread),
         *_steps(engine, found, sets, outputs, known=known, spread=spread),
     )
+    steps = with_compensations(engine, found, file, steps)
     where = _where(regression, found)
     verdict = verdict_of(
         outputs,
@@ -414,7 +419,7 @@ def _steps(
             step,
             index=first + place,
             standing=standings[place],
-            curve=better_curve(engine, final, noise, first + place),
+            curve=open_law(engine, final, noise, first + place),
             small=is_small(standings[place], beside),
         )
 

@@ -28,8 +28,8 @@ from winchkit.diagnosis.results import CandidateScore, Doubt, Estimate, OutputFi
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
-from winchkit.diagnosis.verdict.curve_fits import FittedCurve
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
+from winchkit.diagnosis.verdict.open_law import OpenLaw
 from winchkit.diagnosis.verdict.plausibility import implausible
 
 _MOST_ALTERNATIVES = 3
@@ -126,7 +126,7 @@ def with_standing(
     *,
     index: int,
     standing: Standing,
-    curve: tuple[FittedCurve, float] | None = None,
+    curve: OpenLaw | None = None,
     small: bool = False,
 ) -> Step:
     """A step with its share, law and doubts.
@@ -165,7 +165,7 @@ def _doubts(
     result: SelectionResult,
     step: Step,
     index: int,
-    curve: tuple[FittedCurve, float] | None,
+    curve: OpenLaw | None,
 ) -> list[Doubt]:
     out = []
     regression, term = engine.regression, result.final.hypothesis.terms[index]
@@ -174,10 +174,7 @@ def _doubts(
         out.append(Doubt("alternatives", f"these data cannot distinguish it from {others}"))
         out += step.doubts
     if curve is not None:
-        free, share = curve
-        over = free.variable.replace("_", " ")
-        what = f"a free curve over {over} explains {share:.0%} more: the law is another one"
-        out.append(Doubt("curve", what))
+        out.append(Doubt("curve", curve.text))
     values = step.parameters.get(term.effect.id, {})
     if reason := implausible(term, values, engine.profile):
         out.append(Doubt("implausible", reason))

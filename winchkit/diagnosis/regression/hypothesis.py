@@ -60,6 +60,12 @@ class Hypothesis:
         )
 
 
+def held(term: Term) -> Term:
+    """A term whose values are not fitted."""
+    fixed = tuple(replace(p, role="fixed") for p in term.effect.parameters)
+    return Term(replace(term.effect, parameters=fixed, polar=None), term.values)
+
+
 def started(hypothesis: Hypothesis, run: int) -> Sequence[Term]:
     """Effects with the initial states of one run."""
     out = []

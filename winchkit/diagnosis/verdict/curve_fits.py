@@ -32,6 +32,11 @@ class FittedCurve:
     law: Array = field(repr=False, compare=False)
     """Values at the knots of its basis, shape (knots, k)."""
 
+    @property
+    def words(self) -> str:
+        """Its variable in words."""
+        return self.variable.replace("_", " ")
+
 
 class PartialRegression:
     """Whitened residual with the fitted unknowns projected out, to which curves are fitted."""

@@ -1,9 +1,13 @@
 """Whether the law of a step is open: a free curve explains clearly more than it.
 
-In place of the step every curve over one variable of its outputs is fitted (polynomials, linear
-splines, kinks, powers). A curve over the law's own variable contains the law and explains about as
-much; one that explains more by a tenth shows that the law is another. The same curves show whether
-anything in a residual is predictable at all.
+Curves over one variable (polynomials, linear splines, kinks, powers) speak against a law:
+
+- in place of the step one that explains more by a tenth; a curve over the law's own variable
+  contains the law and explains about as much;
+- beside the step one over the law's own variable that explains a tenth of what the model leaves
+  well above the noise: what is left belongs to the law, and its values contain a part of it.
+
+The same curves show whether anything in a residual is predictable at all.
 
 References
 ----------
@@ -12,8 +16,8 @@ Hart, J. D. (1997). Nonparametric Smoothing and Lack-of-Fit Tests. Springer.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,17 +31,80 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import FittedCurve, PartialRegression, ranked_curves
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
+from winchkit.effects.term import Term
 
 MARGIN = 0.1
 """Share of what a step explains by which a curve must explain more; see docs/methods.md."""
 _TRIED = 3
 """Curves that are tested on held-out data, those of the largest gain."""
+_FAR_ABOVE = 2.0
+"""Ratio of an error to its noise above which a tenth of what is left is a part of a law: half of
+the error and more is no noise."""
+_CURVES_OVER: Mapping[str, tuple[str, ...]] = {
+    "direction": ("speed",),
+    "drum_angle": ("motor_angle",),
+    "load": ("load", "tension"),
+}
+"""Variables of curves that contain the laws over another variable; others are their own."""
 
 
-def better_curve(
+@dataclass(frozen=True)
+class OpenLaw:
+    """A curve that speaks against a law, and why in words."""
+
+    curve: FittedCurve
+    text: str
+
+
+def open_law(
     engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
-) -> tuple[FittedCurve, float] | None:
-    """A curve that explains more than the term at ``index``, and by which share of its excess.
+) -> OpenLaw | None:
+    """A curve that speaks against the law of the term at ``index``, in its place or beside it."""
+    return _better(engine, final, noise, index) or _beside(engine, final, noise, index)
+
+
+def variables_of_law(term: Term) -> frozenset[str]:
+    """Variables of the curves that contain the law of a term, by its place."""
+    over = [variable for _, _, variable in term.effect.place if variable]
+    return frozenset(curve for v in over for curve in _CURVES_OVER.get(v, (v,)))
+
+
+def _beside(
+    engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
+) -> OpenLaw | None:
+    """A curve over the law's own variable that explains a tenth of what is left far above noise."""
+    term = final.hypothesis.terms[index]
+    outputs, over = sorted(term.effect.outputs), variables_of_law(term)
+    regression, folds = engine.regression, engine.folds(final, noise)
+    size: Mapping[str, float | None] = {o: noise.rms[o] for o in outputs if o in noise.rms}
+    present = _errors(regression, final, noise, folds, size)
+    if not (over and noise.from_repeats and _is_above(present, size, _FAR_ABOVE)):
+        return None
+    partial = PartialRegression(final.residual, final.jacobian, noise.inverse_sigma(regression))
+    price = engine.penalty_per_parameter
+    found = ranked_curves(regression, partial, outputs, price, at_places(over))[:1]
+    left = excess(present, size)
+    for curve in found:
+        errors = _errors(regression, _with_curve(regression, final, curve), noise, folds, size)
+        share = 1 - excess(errors, size) / left
+        if curve.net_gain > 0.0 and share > MARGIN:
+            return OpenLaw(
+                curve,
+                f"a curve over {curve.words} beside it explains {share:.0%} of what is left: the "
+                "law is another one, and its values contain a part of that",
+            )
+    return None
+
+
+def at_places(over: Collection[str]) -> frozenset[tuple[str, str]]:
+    """Every place of a curve over some variables."""
+    return frozenset((place, variable) for place in PLACES for variable in over)
+
+
+def _better(
+    engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
+) -> OpenLaw | None:
+    """A curve that explains more than the term at ``index``, in its place.
 
     None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
     parameter) and held out. Where the law leaves its outputs above the noise of repeats and a curve
@@ -65,12 +132,18 @@ def better_curve(
     reaches = lacking and not _is_above(errors[2 + best], size)
     if explained <= 0.0 or (gained <= MARGIN * explained and not reaches):
         return None
-    return found[best], gained / explained
+    return OpenLaw(
+        found[best],
+        f"a free curve over {found[best].words} explains {gained / explained:.0%} more: the law "
+        "is another one",
+    )
 
 
-def _is_above(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> bool:
-    """Whether some error is above its noise."""
-    return any(size and errors[name] > AT_NOISE * size for name, size in noise.items())
+def _is_above(
+    errors: Mapping[str, float], noise: Mapping[str, float | None], ratio: float = AT_NOISE
+) -> bool:
+    """Whether some error is above its noise by a ratio."""
+    return any(size and errors[name] > ratio * size for name, size in noise.items())
 
 
 def predictable_share(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
-from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.hypothesis import Hypothesis, held
 from winchkit.diagnosis.regression.intervals import Spread, estimates
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Doubt, OutputFit, Place, Step
@@ -15,19 +14,12 @@ from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.steps import standing_of
-from winchkit.effects.term import Term
 
 
 def file_model(engine: SelectionEngine, start: Hypothesis, noise: BandNoise) -> Fit:
     """The profile's effects at their file values; offsets and initial states are fitted."""
     of_file = Hypothesis(tuple(map(held, start.terms)), start.nuisances, start.starts)
     return fit(engine.regression, of_file, noise.inverse_sigma(engine.regression))
-
-
-def held(term: Term) -> Term:
-    """A term whose values are not fitted."""
-    fixed = tuple(replace(p, role="fixed") for p in term.effect.parameters)
-    return Term(replace(term.effect, parameters=fixed, polar=None), term.values)
 
 
 def refitted_steps(

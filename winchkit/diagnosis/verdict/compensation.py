@@ -1,0 +1,143 @@
+"""Values that may compensate each other: several steps that one change explains as well.
+
+The steps over one variable are replaced by one curve over it, and those of a torque by one factor
+on what the profile predicts, beside the values of the profile's file. Where that explains as much
+with fewer parameters, none of the steps is certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis, held
+from winchkit.diagnosis.results import Doubt, Step
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.curve_fits import PartialRegression, ranked_curves
+from winchkit.diagnosis.verdict.open_law import at_places, variables_of_law
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
+from winchkit.effects.transition import TRANSITION
+from winchkit.schema.profiles.axis import AxisProfile
+
+_BY_KNOTS = 0.005
+"""Share of what a curve explains that the straight pieces between its knots lose."""
+_FACTOR = 1
+"""Parameters of a factor."""
+
+
+def with_compensations(
+    engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis, steps: Sequence[Step]
+) -> tuple[Step, ...]:
+    """Steps with the doubt that they may compensate each other.
+
+    ``file``: the effects of the profile at their file values.
+    """
+    terms, out = result.final.hypothesis.terms, list(steps)
+    ids = [term.effect.id for term in terms]
+    at = {place: ids.index(step.effects[0]) for place, step in enumerate(steps)}
+    over = {place: variables_of_law(terms[index]) for place, index in at.items()}
+    for variable in sorted(frozenset().union(*over.values())):
+        own = [place for place in at if variable in over[place]]
+        together = _Together.of(engine, result, file, [at[place] for place in own])
+        if together is not None and together.is_curve(variable):
+            what = f"a curve over {variable.replace('_', ' ')}"
+            for place in own:
+                out[place] = _doubted(out[place], "curve", what, len(own))
+    torque = [place for place in at if terms[at[place]].effect.outputs == ("motor_torque",)]
+    if any(steps[place].refitted for place in torque):
+        together = _Together.of(engine, result, file, [at[place] for place in torque])
+        if together is not None and (factor := together.factor()) is not None:
+            what = f"a torque constant that is wrong by {factor - 1:+.1%}"
+            for place in torque:
+                out[place] = _doubted(out[place], "factor", what, len(torque))
+    return tuple(out)
+
+
+def _doubted(step: Step, code: str, what: str, count: int) -> Step:
+    text = (
+        f"{what} explains as much as these {count} effects together, beside the profile's own "
+        "values and with fewer parameters: they may compensate each other"
+    )
+    law = "open" if code == "curve" else step.law
+    return replace(step, law=law, certain=False, doubts=(*step.doubts, Doubt(code, text)))
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Several terms of a final model, and the model with the profile's own values without them."""
+
+    engine: TimeSeriesSelection
+    own: tuple[Term, ...]
+    without: Fit
+    partial: PartialRegression
+    gain: float
+    """Decrease of χ² by the terms."""
+
+    @classmethod
+    def of(
+        cls,
+        engine: TimeSeriesSelection,
+        result: SelectionResult,
+        file: Hypothesis,
+        own: Sequence[int],
+    ) -> _Together | None:
+        """None for fewer than two terms."""
+        if len(own) < 2:
+            return None
+        final, hypothesis = result.final, result.final.hypothesis
+        terms = hypothesis.terms
+        for index in sorted(own, reverse=True):
+            hypothesis = (
+                hypothesis.without(index)
+                if index >= len(file.terms)
+                else hypothesis.with_term_at(index, _of_file(terms[index], file.terms[index]))
+            )
+        weights = result.noise.inverse_sigma(engine.regression)
+        without = fit(engine.regression, hypothesis, weights)
+        partial = PartialRegression(without.residual, without.jacobian, weights)
+        present = PartialRegression(final.residual, final.jacobian, weights)
+        gain = partial.chi_square - present.chi_square
+        return cls(engine, tuple(terms[index] for index in own), without, partial, gain)
+
+    @property
+    def count(self) -> int:
+        """Parameters of the terms."""
+        return sum(Coordinates(term.effect).n_parameters for term in self.own)
+
+    def is_curve(self, variable: str) -> bool:
+        """Whether a curve over a variable explains as much with fewer parameters."""
+        outputs = sorted({name for term in self.own for name in term.effect.outputs})
+        price = self.engine.penalty_per_parameter
+        return any(
+            curve.net_gain > (1 - _BY_KNOTS) * self.gain - price * self.count
+            and curve.explained_ss - curve.net_gain < price * self.count
+            for curve in ranked_curves(
+                self.engine.regression, self.partial, outputs, price, at_places([variable])
+            )
+        )
+
+    def factor(self) -> float | None:
+        """A factor on what the profile predicts that explains as much; None where none does.
+
+        Of an axis only: a winch has a load, by which the torque constant is an effect like others.
+        """
+        regression, price = self.engine.regression, self.engine.penalty_per_parameter
+        if not isinstance(regression.dataset.profile, AxisProfile):
+            return None
+        column = self.partial.projected(regression.change(self.without.hypothesis))
+        length = float(column @ column)
+        if not length > 0.0:
+            return None
+        along = float(column @ self.partial.residual)
+        explained = along**2 / length
+        lost = self.gain - explained
+        return 1 + along / length if lost < price * (self.count - _FACTOR) else None
+
+
+def _of_file(term: Term, old: Term) -> Term:
+    """A term at its file values, but with the transition of its reversal, which is a nuisance."""
+    own = {TRANSITION: term.values[TRANSITION]} if TRANSITION in term.values else {}
+    return held(Term(term.effect, {**old.values, **own}))
