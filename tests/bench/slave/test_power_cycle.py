@@ -191,6 +191,8 @@ def test_after_a_kill_in_motion_the_next_opening_says_so_and_wants_a_reset(
             assert "ended in motion" in str(trip)
             with pytest.raises(LimitTripped, match="ended in motion"):
                 again.winch["A"].jog(wind_in=0.01)
+            with pytest.raises(LimitTripped, match="ended in motion"):
+                again.winch["A"].move_to(3.9)
     with rig.opened() as last:
         last.reset()
         if encoder == "incremental":
