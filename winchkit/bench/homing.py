@@ -12,7 +12,14 @@ from winchkit.bench.lifecycle import await_cycles
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.profile_parameters import HERE, HomingSpec, check_homing
-from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
+from winchkit.errors import (
+    DeviceRefused,
+    DriveFault,
+    MotionError,
+    NoReply,
+    NotPermitted,
+    UsageError,
+)
 
 _SHARE = 0.1
 """Of the winch's speed limit, at which it searches by default."""
@@ -47,10 +54,14 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
         if asked.at is not None:
             yield from _define(bench, winch, winch.motor_angle_at(asked.at) + zero)
         axis.note_zero()
+    except (MotionError, NoReply, DeviceRefused):
+        winch.raise_trouble()  # the cause, where something has tripped
+        raise
     finally:
         if winch.moving:
             winch.stop()
-        if axis.mode != axis.servo.motion_mode:
+        # The reset sets up a drive that restarted or fell silent, its mode included.
+        if axis.mode != axis.servo.motion_mode and not axis.lost_set_up:
             bench.wait_at_rest((winch.name,))
             axis.switch_mode(axis.servo.motion_mode)
             # Until its PDOs show the mode again, any motion is refused.

@@ -165,8 +165,12 @@ class WinchStatus:
             )
 
     def require_length(self) -> None:
-        """Raise NotPermitted where the cable length is not known: no limit of it can be kept."""
+        """Raise NotPermitted where the cable length is not known: no limit of it can be kept.
+
+        What has stopped the bench comes first: no homing is permitted before its reset.
+        """
         if not self.snapshot.length_known:
+            self.raise_trouble()
             speed = self.wiring.limits.speed_unhomed
             jogs = (
                 f"only a jog that is held is permitted, up to {speed:g} m/s (limits.unhomed)"

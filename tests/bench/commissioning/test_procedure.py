@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import threading
@@ -11,6 +12,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
+from rich.console import Console
 
 from slave import Reactions, Slave, State
 from slave_bench import ANSWERS, SlaveBench, served, write_bench
@@ -200,7 +202,10 @@ def test_check_and_monitor_say_which_item_is_missing(
     with served(path) as bench, bench.open() as opened:
         status = LocalStation(opened).status()
         assert "there is no commissioning record" in status["not_commissioned"]
-        assert "there is no commissioning record" in str(status_table(status).caption)
+        shown = Console(width=80, file=io.StringIO())
+        shown.print(status_table(status))
+        assert isinstance(shown.file, io.StringIO)
+        assert "there is no commissioning record" in shown.file.getvalue().replace("\n", " ")
 
 
 def test_a_brake_is_not_tried_on_a_drive_that_stays_enabled(tmp_path: Path) -> None:

@@ -34,6 +34,26 @@ def test_a_reversed_motor_is_called_one(tmp_path: Path, factor: float) -> None:
     assert "slow down" not in said
 
 
+@pytest.mark.parametrize(
+    ("fault", "value", "said"),
+    [
+        ("driven by its load", 7.0, "the motor turns against its command"),
+        ("follows wrongly", 0.2, "the motor does not turn as commanded"),
+    ],
+)
+def test_a_motion_that_is_missing_is_called_what_it_is(
+    tmp_path: Path, fault: str, value: float, said: str
+) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        key = HeldKey(rig, bench, pay_out=0.02).press()
+        rig.wait(1.5)
+        rig.slaves[0].inject(fault, value)
+        rig.until(lambda: bool(bench.snapshot.tripped), within=5.0)
+        key.release()
+        assert said in str(bench.snapshot.tripped[0])
+
+
 def test_a_drive_that_keeps_its_speed_is_not_called_reversed(tmp_path: Path) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:

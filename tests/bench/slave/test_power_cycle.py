@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from slave import Slave
+from slave import Slave, State
 from slave.held_key import HeldKey
 from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
@@ -170,6 +170,26 @@ def test_a_reboot_within_a_process_trips_and_leaves_the_length_unknown(
         assert winch.cable_length == pytest.approx(2.98, abs=2e-3)
 
 
+@pytest.mark.parametrize("after", [0.005, 0.02, 0.05, 0.1, 0.13])
+@pytest.mark.parametrize("method", [None, 1])
+def test_a_reboot_within_a_homing_is_its_error_and_a_reset_mends_it(
+    rig: Rig, after: float, method: int | None
+) -> None:
+    with opened(rig) as bench:
+        winch = bench.winch["A"]
+        rig.clock.call_at(rig.time + after, lambda: rig.slaves[0].inject("reboots"))
+        with pytest.raises(LimitTripped, match="restarted"):
+            winch.home(at=4.0, method=method)
+        booted = rig.time
+        rig.wait(1.0)
+        assert all(s.state is not State.ENABLED for s in rig.samples[0] if s.time > booted)
+        assert math.isnan(winch.cable_length)
+        bench.reset()
+        winch.home(at=4.0)
+        winch.move_to(3.98)
+        assert winch.cable_length == pytest.approx(3.98, abs=2e-3)
+
+
 @pytest.mark.parametrize("encoder", ["absolute", "incremental"])
 def test_after_a_kill_in_motion_the_next_opening_says_so_and_wants_a_reset(
     rig: Rig, encoder: str
@@ -191,6 +211,8 @@ def test_after_a_kill_in_motion_the_next_opening_says_so_and_wants_a_reset(
             assert "ended in motion" in str(trip)
             with pytest.raises(LimitTripped, match="ended in motion"):
                 again.winch["A"].jog(wind_in=0.01)
+            with pytest.raises(LimitTripped, match="ended in motion"):
+                again.winch["A"].move_to(3.9)
     with rig.opened() as last:
         last.reset()
         if encoder == "incremental":

@@ -44,6 +44,10 @@ _FOLLOWING_DEBOUNCE = 0.05
 _SLIP_TIME = 0.5
 """s: lag of a length instrument behind the motor, with its filter, is over."""
 
+_AGAINST = (
+    "its direction is reversed (polarity 607Eh, motor phases, encoder), or the load drives it"
+)
+
 Test = Callable[[WinchInput, Supervised, SupervisorMemory], bool]
 Words = Callable[[WinchInput, Supervised, SupervisorMemory], str]
 When = Literal["", "moving", "disabled", "follows"]
@@ -128,13 +132,20 @@ def _stale_words(item: WinchInput, _own: Supervised, _memory: SupervisorMemory) 
     return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
 
 
+def _missing_words(item: WinchInput, *_: object) -> str:
+    reason = (
+        f"the motor turns against its command; {_AGAINST}"
+        if item.winding_speed * item.commanded < -_DEVIATION * item.commanded**2
+        else "the motor does not turn as commanded, or its encoder does not count; check brake, "
+        "load, encoder and drive limits"
+    )
+    return f"{commanded_and_moved(*item.way)}: {reason}"
+
+
 def _slowing_words(item: WinchInput, own: Supervised, memory: SupervisorMemory) -> str:
     speeds = f"{item.winding_speed:.3f} m/s, commanded {item.target_speed:.3f} m/s"
     if memory.reversed:
-        return (
-            f"the motor turns against its command: {speeds}; its direction is reversed (polarity "
-            "607Eh, motor phases, encoder), or the load drives it"
-        )
+        return f"the motor turns against its command: {speeds}; {_AGAINST}"
     return (
         f"the drive does not slow down as commanded: {speeds}, within "
         f"{own.limits.response_time:g} s (limits.response_time); it does not receive its targets, "
@@ -311,10 +322,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cable commanded less cable moved by the motor, since the motion began",
         "half of the commanded, at least 20 mm, and limits.response_time at the commanded speed",
         Exceeds("missing", lambda _own: 0.0),
-        lambda item, *_: (
-            f"{commanded_and_moved(*item.way)}: the motor does "
-            "not turn or its encoder does not count; check brake, load, encoder and drive limits"
-        ),
+        _missing_words,
         debounce=_DEVIATION_TIME,
         when="follows",
     ),

@@ -134,6 +134,8 @@ class Feed:
         self._readings: dict[str, deque[InstrumentReading]] = {}
         self._listening: list[tuple[Sensor, Callable[[InstrumentReading], None]]] = []
         self._drives = {name: f"/{name}/drive" for name in sensors if has_drives}
+        self._sampled = dict.fromkeys(self._drives, -math.inf)
+        """Time of the drive's last sample that was taken, s."""
         sources = [_drive_source(topic, prefix[name]) for name, topic in self._drives.items()]
         topics: dict[int, str] = {}
         base = _slowest(sensors)
@@ -170,7 +172,8 @@ class Feed:
         pieces = {}
         for name, topic in self._drives.items():
             rows = [_of_drive(snapshot.winch[name]) for snapshot in snapshots]
-            pieces[topic] = _drive_samples(rows)
+            pieces[topic] = _drive_samples(rows, self._sampled[name])
+            self._sampled[name] = max(self._sampled[name], *pieces[topic].received, -math.inf)
         for topic, waiting in self._readings.items():
             pieces[topic] = _samples([waiting.popleft() for _ in range(len(waiting))])
         poses = [] if self._tracker is None else self._tracker.since(self._tracked)
@@ -230,15 +233,15 @@ def _sensor_source(topic: str, prefix: str, role: str, instrument: Sensor) -> Si
     )
 
 
-def _drive_samples(rows: list[tuple[Any, ...]]) -> SourceSamples:
-    """Values of a drive; each SYNC's once."""
+def _drive_samples(rows: list[tuple[Any, ...]], after: float) -> SourceSamples:
+    """Values of a drive after a time (s); each SYNC's once."""
     if not rows:
         return SourceSamples.joined([], len(_DRIVE) + len(_OF_PROFILE))
     unpowered = [row[-1] in _UNPOWERED for row in rows]
     table = np.array([row[:-1] for row in rows])
     # While the brake holds the cable the drive's torque says nothing of it.
     table[unpowered, _TORQUE] = math.nan
-    known = np.isfinite(table[:, 0])
+    known = table[:, 0] > after
     known[1:] &= table[1:, 0] != table[:-1, 0]
     table = table[known]
     return SourceSamples(table[:, 0], table[:, 0], table[:, 1:])

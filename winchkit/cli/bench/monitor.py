@@ -16,7 +16,7 @@ from winchkit.cli.core.terminal import cell, live_table
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.console import Group
 
     from winchkit.bench.remote.operations import Station
 
@@ -84,8 +84,9 @@ def _again(pause: float, end: float | None) -> bool:
     return end is None or time.monotonic() < end
 
 
-def status_table(status: Mapping[str, Any]) -> Table:
-    """The winches of a picture, a row each."""
+def status_table(status: Mapping[str, Any]) -> Group:
+    """The winches of a picture, a row each, and below them what is wrong, in the whole width."""
+    from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
@@ -102,14 +103,15 @@ def status_table(status: Mapping[str, Any]) -> Table:
     )
     table = Table(
         title=f"cycle {status['cycle']}, overruns {status['overruns']}",
-        caption=Text("\n".join(map(one_line, trouble)) or "no trips"),
+        padding=0,
+        show_edge=False,
     )
     table.add_column("winch")
     table.add_column("phase", min_width=len("running down"))
     for head in ("length", "cable speed", "torque", "tension"):
         table.add_column(head, justify="right", no_wrap=True)
     table.add_column("drive, sensors")
-    table.add_column("commanded by")
+    table.add_column("commanded by", overflow="fold")
     for name, winch in status["winch"].items():
         table.add_row(
             cell(name),
@@ -121,7 +123,7 @@ def status_table(status: Mapping[str, Any]) -> Table:
             cell(", ".join([winch["state"], *_complaints(winch["quality"] or {})])),
             cell(winch.get("commander") or "—"),
         )
-    return table
+    return Group(table, Text("\n".join(map(one_line, trouble)) or "no trips"))
 
 
 def _lost(bus: Mapping[str, Any]) -> str:

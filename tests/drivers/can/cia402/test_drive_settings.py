@@ -241,7 +241,7 @@ def test_a_homing_here_needs_no_speeds_and_takes_a_makers_home_position() -> Non
     assert objects.written == [(0x6098, 0, 37), (0x30B0, 0, 2000)]
 
 
-@pytest.mark.parametrize("code", [-1, -3])
+@pytest.mark.parametrize("code", [-1, -3, 9, 300])
 def test_a_quick_stop_that_may_do_nothing_is_refused_even_with_a_brake(code: int) -> None:
     objects = Objects({**CODES, 0x605A: code})
     with pytest.raises(NotPermitted, match="may ignore a quick stop"):

@@ -276,7 +276,7 @@ def _set_quick_stop(
     except (NotPermitted, DeviceRefused) as error:
         if watch.quick_stop_declared:
             raise
-        return (f"{error}; until then its quick stops have the drive's own ramp",)
+        return (f"{error}; until then its quick stops are what the drive makes of them",)
     return ()
 
 

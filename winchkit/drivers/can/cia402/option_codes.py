@@ -112,12 +112,13 @@ def _check_lost(node: SdoNode, lost: OptionCode) -> None:
 
 
 def _check_quick_stop(node: SdoNode, quick_stop: OptionCode) -> None:
-    """A maker's own code below zero may mean that quick stop does nothing: no brake mends that."""
-    if quick_stop.value is not None and quick_stop.value < 0:
+    """A code beyond the standard's may mean that quick stop does nothing: no brake mends that."""
+    if quick_stop.meaning == _UNKNOWN:
         raise NotPermitted(
-            f"{node.place(quick_stop.index)} is {quick_stop.value}, a code of the maker's own: the "
-            "drive may ignore a quick stop, which every stop relies on; set it to 2 or 6 (ramp), "
-            "in the drive or as servo.options.quick_stop in its device file"
+            f"{node.place(quick_stop.index)} is {quick_stop.value}, a code that is not one of the "
+            "standard's (0 to 8): the drive may ignore a quick stop, which every stop relies on; "
+            "set it to 2 or 6 (ramp), in the drive or as servo.options.quick_stop in its device "
+            "file"
         )
 
 

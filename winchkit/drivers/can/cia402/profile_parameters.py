@@ -67,8 +67,8 @@ def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: CountScale, accelerat
     option = node.read_if_there(0x605A)
     if option not in _BY_RAMP or node.read_if_there(0x6085) is None:
         raise NotPermitted(
-            f"{node.place(0x605A)} is {option}: quick stops use 6085h with 2 and 6 only, and the "
-            "drive must have it; set options.quick_stop = 2"
+            f"{node.place(0x605A)} is {'missing' if option is None else option}: quick stops use "
+            "6085h with 2 and 6 only, and the drive must have it; set options.quick_stop = 2"
         )
     node.write_verified(0x6085, 0, _ramp(servo, scale, acceleration))
 
