@@ -13,6 +13,9 @@ from winchkit.fleet.library.sessions import winch_sessions
 from winchkit.fleet.report.text import change_text, odd_texts
 from winchkit.fleet.web.runs import Library
 from winchkit.plain_json import significant
+from winchkit.quantity_text import scale_for
+from winchkit.report.words.sentence import capital
+from winchkit.report.words.vocabulary import effect_name
 
 _DIGITS = 4
 
@@ -86,12 +89,14 @@ class Fleet:
 
 
 def _parameter(own: FleetParameter) -> dict[str, Any]:
-    share = own.unit == "1"
-    unit, factor = ("%", 100.0) if share else (own.unit, 1.0)
+    sizes = (own.common, own.common_std, own.between_std, own.session_std)
+    scale = scale_for(sizes, "%" if own.unit == "1" else own.unit)
+    factor = 1.0 / scale.worth
     return {
         "effect": own.effect,
+        "name": capital(effect_name(own.effect)),
         "parameter": own.parameter,
-        "unit": unit,
+        "unit": scale.label,
         "common": factor * own.common,
         "common_std": factor * own.common_std,
         "between_std": factor * own.between_std,

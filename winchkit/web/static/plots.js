@@ -69,19 +69,23 @@ function marks(runs) {
   };
 }
 
-// Means over bins as lines, broken where no sample lies between two bins.
+// Means over bins as lines, broken where no sample lies between two bins; `timed` ones, in the order
+// of time, are broken where a value is missing.
 function traced(traces) {
   return (u) => {
     const { ctx, bbox } = u;
     ctx.save();
     ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-    for (const { x, y, tone, width } of traces) {
+    for (const { x, y, tone, width, timed } of traces) {
       const steps = x.slice(1).map((value, i) => value - x[i]).sort((a, b) => a - b), wide = 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
       ctx.strokeStyle = colour(tone); ctx.lineWidth = width * devicePixelRatio; ctx.lineJoin = "round";
       ctx.beginPath();
+      let pen = false;
       x.forEach((value, i) => {
+        if (value === null || y[i] === null) { pen = false; return; }
         const at = [u.valToPos(value, "x", true), u.valToPos(y[i], "y", true)];
-        if (i === 0 || (u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+        if (!pen || (!timed && u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+        pen = true;
       });
       ctx.stroke();
     }

@@ -43,9 +43,16 @@ const todayOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === 
 const floorOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === "floor").cells;
 const text = (cell) => (cell ? cell.text : "–");
 
+// Colours of both sides: that of the better model for the smaller error above its noise floor.
+function tones(view, output) {
+  const [a, b] = sidesOf(view).map((side) => (todayOf(side)[output] || {}).ratio ?? Infinity);
+  return a < b ? ["with", "today"] : ["today", "with"];
+}
+
 function headline(view, output) {
   const { name, unit } = view.diagnosis.ladder.columns.find((c) => c.output === output), [a, b] = sidesOf(view).map((side) => text(todayOf(side)[output]));
-  return `${name} error ${a} ${unit} with A, ${b} ${unit} with B`;
+  const [first, second] = tones(view, output).map((tone) => (tone === "with" ? "after" : "before"));
+  return [`${name} error `, el("b", { class: first }, `${a} ${unit}`), " with A, ", el("b", { class: second }, `${b} ${unit}`), " with B"];
 }
 
 function errors(view, output, focus) {
@@ -73,7 +80,7 @@ async function drawTimes(view, output, boxes) {
       clearTimeout(zoom.timer); zoom.timer = setTimeout(() => drawTimes(view, output, boxes), 60);
     };
     found.forEach((data, i) => {
-      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = ["today", "with"][i], label = `${"AB"[i]}: ${data.name}`;
+      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = tones(view, output)[i], label = `${"AB"[i]}: ${data.name}`;
       const figure = () => ({ title: `${label}, measured and predicted, and the residual`, source: source(side), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone }, { name: "noise floor ±1σ", tone: "edge" }],
         panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
           { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
@@ -92,7 +99,7 @@ async function drawOver(view, output, boxes) {
     if (!boxes[0].isConnected) return;
     const range = sym(found.flatMap((own) => own.residual));
     found.forEach((own, i) => {
-      const grid = el("div", { class: "multiples" }), tone = ["today", "with"][i];
+      const grid = el("div", { class: "multiples" }), tone = tones(view, output)[i];
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, `${"AB"[i]}: residual against each variable`), el("span", { class: "note" }, "share of variance")), grid);
       for (const name of names) {
         const pair = found.map((each) => each.panels.find((panel) => panel.variable === name)), panel = pair[i];
