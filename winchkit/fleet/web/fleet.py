@@ -70,7 +70,7 @@ class Fleet:
                 "winches": len({session.winch for session in sessions}),
                 "procedure": history.procedure,
                 "undetermined": history.undetermined,
-                "parameters": [_parameter(own) for own in history.parameters],
+                "parameters": [parameter_json(own) for own in history.parameters],
             }
         return out
 
@@ -88,7 +88,8 @@ class Fleet:
         raise UsageError(f"there is no session of winch '{winch}' at {time:.0f}")
 
 
-def _parameter(own: FleetParameter) -> dict[str, Any]:
+def parameter_json(own: FleetParameter) -> dict[str, Any]:
+    """A parameter of an effect over the fleet, in the unit that suits its common value."""
     sizes = (own.common, own.common_std, own.between_std, own.session_std)
     scale = scale_for(sizes, "%" if own.unit == "1" else own.unit)
     factor = 1.0 / scale.worth

@@ -12,7 +12,7 @@ import { card, lengthOf, picture as drawn, words as said } from "./winch.js";
 
 // Values that are older than `OLD` ms, twenty pictures, are grey, and nothing is offered.
 const PERIOD = 50, OLD = 1000, LOOK = 250, ANSWER = 3000, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -21,6 +21,7 @@ export async function station(state) {
     const found = await ask("/api/bench");
     history = await ask("/api/bench/history");
     declared = found;
+    logName = found.log;
     winch = Object.keys(declared.winch)[0];
     link = socket("/live/bench", receive, () => { cut = true; answers = 0; look(); });
     setInterval(look, LOOK);
