@@ -81,7 +81,7 @@ def robot(page: Any, url: str) -> None:
     """Robot view with calibrated poses and a slice of the feasible ones."""
     page.goto(url)
     page.wait_for_selector("#details svg", timeout=120_000)
-    page.wait_for_timeout(10_000)
+    page.wait_for_selector("text=margin 0 to", timeout=120_000)
 
 
 def library(page: Any, url: str) -> None:
