@@ -190,7 +190,7 @@ const words = (state) => said(state, tripped().length > 0);
 // States of a drive (CiA 402) in words; its own name for the state is the tooltip.
 const OFF = ["not ready to switch on", "switch on disabled", "ready to switch on", "switched on"];
 const DRIVE = { ...Object.fromEntries(OFF.map((name) => [name, "drive off"])), "operation enabled": "drive on", "quick stop active": "quick stop", fault: "drive fault", "fault reaction active": "drive fault" };
-const by = (name) => (!name ? "" : name.startsWith("page ") ? `commanded from ${commands() ? "this page" : "another tab"}` : `commanded by ${name}`);
+const by = (name) => (!name || commands() ? "" : name.startsWith("page ") ? "commanded from another tab" : `commanded by ${name}`);
 const drum = (name) => (picture && picture.status.drum && picture.status.drum[name]) || { turns: null, radius: null, guide: null };
 
 function show() {
@@ -388,7 +388,7 @@ function refresh() {
   offer();
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
-  document.getElementById("says").textContent = picture && !commands() && !old() ? by(picture.commander) : "";
+  document.getElementById("says").textContent = picture && !old() ? by(picture.commander) : "";
   const log = picture && picture.recording;
   const record = document.getElementById("record"), mine = commands() || Boolean(log);
   const named = document.querySelector(".context input.file");

@@ -351,7 +351,7 @@ async function drawMultiples() {
     const found = await ask(`/api/multiples?output=${output}${over.map((name) => `&over=${encodeURIComponent(name)}`).join("")}`);
     if (output !== shown.output || !box.isConnected) return;
     const grid = el("div", { class: "multiples" }), drawnOver = found.panels.map((panel) => panel.variable), others = found.variables.filter(([name]) => !drawnOver.includes(name));
-    const another = others.length ? el("select", { class: "exports", "aria-label": "Another variable", onchange: () => { over = [another.value, ...drawnOver.slice(0, -1)]; drawMultiples(); } }, el("option", { value: "" }, "Over…"), others.map(([name, words]) => el("option", { value: name }, words))) : null;
+    const another = others.length ? el("select", { class: "another", "aria-label": "Another variable", onchange: () => { over = [another.value, ...drawnOver.slice(0, -1)]; drawMultiples(); } }, el("option", { value: "" }, "Over…"), others.map(([name, words]) => el("option", { value: name }, words))) : null;
     fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), el("span", { class: "row end" }, another, exporter(`${output}-residual`, () => multiplesFigure(found)))), grid);
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {

@@ -7,7 +7,7 @@ const FONT = "12px Inter, system-ui, sans-serif", RIGHT = 10, LEAST_LEFT = 60;
 function label(u, ticks, unit, words) {
   const shown = ticks.map((tick) => (tick === null ? "" : words(tick))), { min, max, distr } = u.scales.x, at = (value) => (distr === 3 ? Math.log10(value) : value);
   const room = (tick) => RIGHT + ((at(max) - at(tick)) / (at(max) - at(min) || 1)) * (u.width - LEAST_LEFT - RIGHT);
-  const last = shown.findLastIndex((text, i) => text !== "" && 3.5 * (text.length + 1 + unit.length) <= room(ticks[i]));
+  const last = shown.findLastIndex((text, i) => text !== "" && 3.3 * (text.length + 1 + unit.length) <= room(ticks[i]));
   return shown.map((text, index) => (index === last && unit ? `${text} ${unit}` : text));
 }
 
