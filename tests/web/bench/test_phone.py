@@ -19,24 +19,23 @@ SMALL = """() => [...document.querySelectorAll("button, select, input, a, summar
     .map((one) => one.textContent || one.getAttribute("aria-label"))"""
 
 
+PLACES = """(names) => names.map((name) => document.querySelector(name).getBoundingClientRect())
+    .map(({ top, bottom }) => [top, bottom])"""
+
+
 def test_a_page_with_a_bench_opens_it_with_stop_and_jogs_within_reach(
     browser: Any, bench: Served
 ) -> None:
     page, complaints = opened(browser, bench.url, viewport=SIZE)
     until(page, lambda: page.locator("#values .value").count() == 3)
     assert "#bench/" in page.url
-    reach = [page.locator("#stopbar .jog").nth(i) for i in (0, 1)]
-    for node in (*reach, page.locator("#stopbar .stop")):
-        box = node.bounding_box()
-        assert box["y"] > SIZE["height"] / 2
-        assert box["y"] + box["height"] <= SIZE["height"]
-        assert box["height"] >= 56
+    reach = ["#stopbar .jog:nth-child(1)", "#stopbar .jog:nth-child(2)", "#stopbar .stop"]
+    for top, bottom in page.evaluate(PLACES, reach):
+        assert SIZE["height"] / 2 < top <= bottom - 56
+        assert bottom <= SIZE["height"]
     assert page.inner_text("#values").rstrip().endswith("drive off")
-    values, orders, winch = (
-        page.locator(selector).bounding_box()["y"]
-        for selector in ("#values", ".controls", "#drawing")
-    )
-    assert values < orders < winch
+    places = page.evaluate(PLACES, ["#values", ".controls", "#drawing"])
+    assert places == sorted(places), "orders follow the values"
     assert page.evaluate(SMALL) == []
     assert page.evaluate("document.documentElement.scrollWidth") == SIZE["width"]
     assert complaints == []
