@@ -25,10 +25,9 @@ def lines_of(runs: Iterable[tuple[str, Run]], channel: str, over: str = TIME) ->
     runs, the first one interpolated at the instants of the second one as far as both last.
     """
     own = [(name, run) for name, run in runs if {channel, over} <= {TIME, *run.channels}]
+    difference = _difference(own, channel) if over == TIME and len(own) == 2 else None
     found = [_line(name, run, channel, over) for name, run in own]
-    return {"channel": channel, "over": over, "lines": found, "difference": None} | (
-        {"difference": _difference(own, channel)} if over == TIME and len(own) == 2 else {}
-    )
+    return {"channel": channel, "over": over, "lines": found, "difference": difference}
 
 
 def _values(run: Run, name: str) -> tuple[str, Array]:
