@@ -23,8 +23,8 @@ SMALL = """() => [...document.querySelectorAll("button, select, input, a, summar
 
 
 @pytest.fixture(scope="module")
-def served() -> Iterator[Served]:
-    found = Served("--mystery", "1")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    found = Served("--mystery", "1", folder=tmp_path_factory.mktemp("work"))
     yield found
     found.end()
 
