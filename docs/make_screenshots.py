@@ -58,30 +58,28 @@ def diagnose(page: Any, url: str) -> None:
 
 
 def bench(page: Any, url: str) -> None:
-    """Bench view while a jog is held."""
+    """Bench view while the winch moves."""
     page.goto(f"{url}#bench")
     page.wait_for_selector("#values .value", timeout=60_000)
     page.click("#take")
     page.wait_for_timeout(25_000)
-    box = page.locator(".controls .jog").first.bounding_box()
-    page.mouse.move(box["x"] + 20, box["y"] + 20)
-    for _ in range(TRIES):  # a busy computer ends the jog: the page answers too late
-        page.mouse.down()
+    page.fill("[aria-label='Cable length, m']", "2.5")
+    for _ in range(TRIES):  # a busy computer ends the move: the page answers too late
+        page.click(".move button")
+        page.evaluate("scrollTo(0, 0)")
         page.wait_for_timeout(8000)
         if page.inner_text("#values .state span").lower() == "winding in":
             return
-        page.mouse.up()
-        page.wait_for_timeout(1000)
         for close in page.locator("#banner button").all():
             close.click()
-    sys.exit("bench: the jog was not held; take the picture on a quieter computer")
+    sys.exit("bench: the move ended early; take the picture on a quieter computer")
 
 
 def robot(page: Any, url: str) -> None:
     """Robot view with calibrated poses and a slice of the feasible ones."""
     page.goto(url)
     page.wait_for_selector("#details svg", timeout=120_000)
-    page.wait_for_timeout(10_000)
+    page.wait_for_selector("text=margin 0 to", timeout=120_000)
 
 
 def library(page: Any, url: str) -> None:
@@ -123,7 +121,8 @@ def main() -> None:
             with served(folder, *arguments) as url:
                 page = browser.new_page(viewport=SIZE)
                 show(page, url)
-                page.screenshot(path=PICTURES / f"page-{name}.png", full_page=True)
+                whole = name != "bench"  # it stops what moves, as long as it takes
+                page.screenshot(path=PICTURES / f"page-{name}.png", full_page=whole)
                 page.close()
         browser.close()
 

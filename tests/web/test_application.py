@@ -132,6 +132,7 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
             "figures.js",
             "sides.js",
             "ladder.js",
+            "channels.js",
         )
     )
     assert "https://" not in text

@@ -9,6 +9,7 @@ pytest.importorskip("starlette")
 
 from winchkit.arrays import Array
 from winchkit.runs.run import Channel, Run
+from winchkit.web.channels import lines_of
 from winchkit.web.curves import OutputCurves, recorded_curves
 
 N = 4000
@@ -87,3 +88,35 @@ def test_runs_are_drawn_as_recorded_before_they_are_compared() -> None:
     assert shown["runs"] == [{"at": 0.0, "name": "10 kg"}, {"at": 20.0, "name": "20 kg"}]
     assert set(shown["predicted"]) == set(shown["residual"]) == {None}
     assert not found["tension"].is_compared
+
+
+def test_any_channel_is_drawn_over_any_other() -> None:
+    time = np.arange(20_000) * 0.001
+    angle = np.cos(2 * np.pi * 0.1 * time)
+    loop = {
+        "motor_angle": Channel(angle, "rad"),
+        "tension": Channel(np.sin(0.2 * np.pi * time), "N"),
+    }
+    runs = [
+        ("loop", Run("loop", 7.0 + time, loop)),
+        ("bare", Run("bare", time, dict([*loop.items()][:1]))),
+    ]
+    found = lines_of(runs, "tension", "motor_angle")
+    (line,) = found["lines"]
+    assert (line["name"], line["unit"], line["x_unit"]) == ("loop", "N", "rad")
+    assert len(line["x"]) <= 3300
+    np.testing.assert_allclose(np.hypot(line["x"], line["y"]), 1.0, atol=1e-4)
+    assert {max(line["x"]), min(line["x"])} == {1.0, -1.0}, "extremes of both channels stay"
+    assert found["difference"] is None
+    (over_time,) = lines_of(runs, "tension")["lines"]
+    assert over_time["x_unit"] == "s"
+    np.testing.assert_allclose(
+        over_time["y"], np.sin(0.2 * np.pi * np.array(over_time["x"])), atol=1e-4
+    )
+    assert lines_of(runs, "load", "tension")["lines"] == []
+
+
+def test_the_residual_is_drawn_over_a_chosen_variable() -> None:
+    found = curves(1e-3 * np.sin(ANGLE)).multiples(variables=["speed"])
+    assert [panel["variable"] for panel in found["panels"]] == ["speed"]
+    assert [name for name, _ in found["variables"]] == ["drum_angle", "cable_length", "speed"]

@@ -23,8 +23,8 @@ SMALL = """() => [...document.querySelectorAll("button, select, input, a, summar
 
 
 @pytest.fixture(scope="module")
-def served() -> Iterator[Served]:
-    found = Served("--mystery", "1")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    found = Served("--mystery", "1", folder=tmp_path_factory.mktemp("work"))
     yield found
     found.end()
 
@@ -132,6 +132,30 @@ def test_verdict_ladder_and_residual_are_seen_at_a_height_of_900(
     assert box["y"] + box["height"] <= 900
     heights = {row.bounding_box()["height"] for row in page.locator(".ladder .name").all()}
     assert heights == {27}
+    assert complaints == []
+    page.context.close()
+
+
+def test_any_channel_over_another_is_chosen_drawn_and_saved(
+    browser: Any, served: Served, tmp_path: Path
+) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose")
+    page.click("#channels summary")
+    page.select_option("#channels [aria-label=Channel]", "motor_torque")
+    page.select_option("#channels [aria-label=Over]", "temperature")
+    name = "motor_torque-over-temperature"
+    until(page, lambda: page.locator(f"[aria-label='Save {name}']").count() == 1)
+    with page.expect_download() as waiting:
+        page.select_option(f"[aria-label='Save {name}']", "CSV")
+    waiting.value.save_as(tmp_path / "drawn.csv")
+    heads = (tmp_path / "drawn.csv").read_text().splitlines()[2].split(",")
+    assert heads[0] == "temperature [degC]"
+    assert heads[1].endswith("[N m]")
+    over = page.locator("[aria-label='Another variable'] option")
+    if over.count() > 1:
+        words = over.nth(1).inner_text()
+        page.select_option("[aria-label='Another variable']", index=1)
+        until(page, lambda: words in page.locator("#over h3").first.inner_text())
     assert complaints == []
     page.context.close()
 

@@ -209,4 +209,5 @@ class WinchStatus:
             raise DriveFault(f"winch {self.name} was stopped with {self._controller.reason}")
         if self._controller.stopped:
             who = self.stopped_by or "the control loop"
-            raise MotionError(f"winch {self.name} was stopped by {who} before the motion's end")
+            what = f"was stopped by {who} before the move was finished"
+            raise MotionError(f"winch {self.name} {what}")

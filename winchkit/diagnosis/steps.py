@@ -135,7 +135,7 @@ def with_standing(
     """
     doubts = list(_doubts(engine, result, step, index, curve))
     if not standing.certain:
-        what = "more is left in its outputs than a tenth of what it explains"
+        what = "the error that it leaves is more than a tenth of what it explains"
         doubts.append(Doubt("remaining", what))
     if standing.rounded:
         what = f"{standing.rounded} with a reversal rounded over a speed explains nine tenths of it"

@@ -23,6 +23,7 @@ from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import drawing
 from winchkit.version import __version__
+from winchkit.web.channels import TIME, lines_of
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
 from winchkit.web.views import View, attachment
@@ -234,6 +235,7 @@ class _Drawings:
         return [
             Route("/api/curve", self._curve),
             Route("/api/multiples", self._multiples),
+            Route("/api/lines", self._lines),
             Route("/api/card", self._card),
             Route("/api/pattern", self._pattern),
             Route("/api/plan", self._plan, methods=["POST"]),
@@ -256,6 +258,12 @@ class _Drawings:
         curves = self.workspace.curves(output, beside=beside)
         known = self.workspace.side(beside).order_of(output)
         return JSONResponse(await asyncio.to_thread(curves.multiples, known, wanted))
+
+    async def _lines(self, request: Request) -> Response:
+        query, used = request.query_params, self.workspace.state.used
+        runs = [(item.name, item.run) for item in used]
+        channel, over = query.get("channel", ""), query.get("over", TIME)
+        return JSONResponse(await asyncio.to_thread(lines_of, runs, channel, over))
 
     async def _card(self, request: Request) -> Response:
         effect = request.query_params.get("effect", "")

@@ -137,6 +137,7 @@ class OutputCurves:
             "time": significant(self.time[kept].tolist(), _TIME_DIGITS),
             "residual": significant(residual[kept].tolist(), _DIGITS),
             "panels": panels,
+            "variables": [[name, _capital_name(name)] for name in self.shares],
         }
 
     def main_variable(self, change: Array) -> tuple[str, int | None] | None:

@@ -79,6 +79,7 @@ class LoadedRun:
             "load": run.metadata.get("load_mass", ""),
             "programme": run.metadata.get("programme", ""),
             "winches": run.winches(),
+            "channels": list(run.channels),
         }
 
 

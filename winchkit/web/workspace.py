@@ -42,7 +42,7 @@ from winchkit.web.foreign import import_command, imported
 from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, PageState, Version
-from winchkit.web.words import page_text
+from winchkit.web.words import free_path, page_text
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
@@ -471,10 +471,7 @@ class DiagnoseView:
 
     def _free(self, name: str) -> Path:
         """A new file in the user's folder."""
-        path, number = self._made(self.work) / name, 2
-        while path.exists():
-            path, number = path.with_stem(f"{Path(name).stem}-{number}"), number + 1
-        return path
+        return free_path(self._made(self.work), name)
 
     @staticmethod
     def _made(folder: Path) -> Path:

@@ -70,6 +70,30 @@ def test_a_grid_shows_steps_and_odd_winches(folder: Path, monkeypatch: pytest.Mo
     assert winches["E"]["odd"]
 
 
+def test_values_have_the_prefix_of_the_fleet() -> None:
+    random = np.random.default_rng(6)
+    known = [
+        SessionEstimate(
+            winch,
+            START + week * WEEK,
+            "drum-radius",
+            "radius_error",
+            random.normal(49e-6, 50e-6),
+            50e-6,
+            "m",
+            (),
+            {"tension": 150.0},
+        )
+        for winch in "ABCDE"
+        for week in range(12)
+    ]
+    (own,) = map(fleet_view.parameter_json, fleet_history(known).parameters)
+    assert (own["name"], own["unit"]) == ("Winding radius of the drum", "µm")
+    values = np.array([one["values"] for one in own["winches"]])
+    assert own["common"] == pytest.approx(49.0, abs=25.0)
+    assert values.std() == pytest.approx(50.0, rel=0.3)
+
+
 def test_a_cell_leads_to_its_runs(folder: Path) -> None:
     fleet = Fleet(Library(folder))
     view = fleet.view()

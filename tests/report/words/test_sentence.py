@@ -69,12 +69,14 @@ def test_without_repeats_the_noise_has_two_bounds() -> None:
     assert text.endswith("to 0.360 mm (noise 0.300 to 0.360 mm).")
     calm = replace(unsure, heldout_rms_before=0.36e-3)
     adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": calm}))
-    assert adequate.startswith("No known effect is missing. Held-out error: 0.360 mm rms, noise")
+    assert adequate.startswith(
+        "No known effect is missing. The cable length error is 0.360 mm rms, noise"
+    )
 
 
 def test_adequate_has_the_largest_error_with_the_noise() -> None:
     assert sentence(diagnosis_of("adequate", outputs={"tension": AT_NOISE})) == (
-        "No effect is missing. Held-out error: 0.753 N rms, about its noise of 0.742 N."
+        "No effect is missing. The tension error is 0.753 N rms, about its noise of 0.742 N."
     )
 
 
@@ -91,7 +93,7 @@ def test_an_effect_without_a_fall_of_the_error_is_reported_so() -> None:
 
 def test_unknown_has_the_patterns_and_no_name() -> None:
     text = sentence(diagnosis_of("unknown", unexplained_share=0.99, where=FIVE_CORNERS))
-    assert text.startswith("No known effect explains the cable length error. Held-out error:")
+    assert text.startswith("No known effect explains the cable length error. It is ")
     assert "99 % of the error above the noise remains. Main patterns: " in text
     assert "tension, 5 periods per drum turn (44 % of its residual variance)" in text
     assert "motor torque, as a function of drum angle" in text

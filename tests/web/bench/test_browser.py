@@ -197,8 +197,8 @@ def rail(page: Any) -> float:
 
 
 @pytest.fixture(scope="module")
-def example() -> Iterator[Served]:
-    found = Served("--mystery", "1")
+def example(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    found = Served("--mystery", "1", folder=tmp_path_factory.mktemp("work"))
     yield found
     found.end()
 

@@ -111,9 +111,9 @@ class _Story:
 
     def print(self, text: str) -> None:
         """Print a text to stdout, or to stderr where JSON goes to stdout."""
-        import textwrap
+        from winchkit.report.words.columns import paragraph
 
-        click.echo(textwrap.fill(text, 80, subsequent_indent="  "), err=self._quiet)
+        click.echo("\n".join(paragraph(text, then="  ")), err=self._quiet)
 
 
 def _add_errors(story: _Story, comparison: Comparison, findings: LoopResult) -> None:

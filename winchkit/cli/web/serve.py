@@ -11,6 +11,7 @@ from winchkit.catalog import find
 from winchkit.cli.core.command import Example, ToolCommand
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
 from winchkit.cli.core.early_checks import check_bench, check_file
+from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import PROFILE, RUN, own_effects_option
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.model.options import declared_profile
@@ -75,6 +76,9 @@ def command(
     if mystery is not None and (runs or profile):
         raise UsageError("--mystery: opens runs and a profile of its own; leave RUN and -p out")
     _check_files(runs, profile, bench, simulated)
+    if bench or simulated:
+        what = f"simulated bench '{simulated}'" if simulated else f"bench of {bench}"
+        note(f"the {what} starts; the address of the page follows in some seconds")
     from winchkit.web.server import serve
 
     # A report or a fit under way is of no use without the page.

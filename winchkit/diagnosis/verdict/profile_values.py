@@ -45,7 +45,7 @@ def refitted_steps(
         if not standing.explained > 0.0:
             continue  # within the noise both values are right
         gain = 1 - min(now[name] / errors[name] for name in now if errors[name]) ** 2
-        what = "more is left in its outputs than a tenth of what its new value explains"
+        what = "the error left is more than a tenth of what its new value explains"
         yield Step(
             (term.effect.id,),
             {term.effect.id: values},

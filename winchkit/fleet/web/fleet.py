@@ -13,6 +13,9 @@ from winchkit.fleet.library.sessions import winch_sessions
 from winchkit.fleet.report.text import change_text, odd_texts
 from winchkit.fleet.web.runs import Library
 from winchkit.plain_json import significant
+from winchkit.quantity_text import scale_for
+from winchkit.report.words.sentence import capital
+from winchkit.report.words.vocabulary import effect_name
 
 _DIGITS = 4
 
@@ -67,7 +70,7 @@ class Fleet:
                 "winches": len({session.winch for session in sessions}),
                 "procedure": history.procedure,
                 "undetermined": history.undetermined,
-                "parameters": [_parameter(own) for own in history.parameters],
+                "parameters": [parameter_json(own) for own in history.parameters],
             }
         return out
 
@@ -85,13 +88,16 @@ class Fleet:
         raise UsageError(f"there is no session of winch '{winch}' at {time:.0f}")
 
 
-def _parameter(own: FleetParameter) -> dict[str, Any]:
-    share = own.unit == "1"
-    unit, factor = ("%", 100.0) if share else (own.unit, 1.0)
+def parameter_json(own: FleetParameter) -> dict[str, Any]:
+    """A parameter of an effect over the fleet, in the unit that suits its common value."""
+    sizes = (own.common, own.common_std, own.between_std, own.session_std)
+    scale = scale_for(sizes, "%" if own.unit == "1" else own.unit)
+    factor = 1.0 / scale.worth
     return {
         "effect": own.effect,
+        "name": capital(effect_name(own.effect)),
         "parameter": own.parameter,
-        "unit": unit,
+        "unit": scale.label,
         "common": factor * own.common,
         "common_std": factor * own.common_std,
         "between_std": factor * own.between_std,

@@ -12,22 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.fleet.library.description import described
 from winchkit.fleet.library.files import RunFile, run_files
 from winchkit.fleet.library.partitions import Partitions, Row
-from winchkit.plain_json import significant
-from winchkit.report.figures.reduction import decimated
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
+from winchkit.web.channels import lines_of
 from winchkit.web.state import Judgement
 
 _MOST_READ = 2000
 """Files that are read for the list; an index has them at once."""
-_POINTS = 1600
 
 
 @dataclass(frozen=True)
@@ -89,28 +84,9 @@ class Library:
             raise UsageError(f"there is no run '{name}' in the folder")
         return self._runs[name]
 
-    def overlay(self, names: Sequence[str], channel: str) -> dict[str, Any]:
-        """A channel of several runs from their starts, reduced for drawing; of two, the difference.
-
-        The first run is interpolated at the instants of the second one as far as both last.
-        """
-        curves: list[tuple[str, str, Array, Array]] = []
-        for name in names:
-            own = self.run(name).read()
-            if channel in own:
-                unit = own.channels[channel].unit
-                curves.append((name, unit, own.time - own.time[0], own[channel]))
-        difference = None
-        if len(curves) == 2:
-            (first, unit, x1, y1), (second, _, x2, y2) = curves
-            both = x2 <= x1[-1]
-            change = y2[both] - np.interp(x2[both], x1, y1)
-            difference = _line(f"{second} less {first}", unit, x2[both], change)
-        return {
-            "channel": channel,
-            "lines": [_line(*curve) for curve in curves],
-            "difference": difference,
-        }
+    def overlay(self, names: Sequence[str], channel: str, over: str) -> dict[str, Any]:
+        """A channel of several runs over time or another channel, as ``lines_of`` has it."""
+        return lines_of([(name, self.run(name).read()) for name in names], channel, over)
 
     def _described(self, file: RunFile) -> list[Row]:
         stamp = file.size, file.mtime
@@ -161,14 +137,3 @@ def _date(row: Row) -> str:
     time = row["time"]
     is_day = row["time_source"] in {"metadata", "path"} and time.time() == time.min.time()
     return str(time.date().isoformat() if is_day else time.isoformat(timespec="minutes"))
-
-
-def _line(name: str, unit: str, x: Array, y: Array) -> dict[str, Any]:
-    """A curve reduced to the extremes of every pixel."""
-    shown = decimated([y], _POINTS // 2)
-    return {
-        "name": name,
-        "unit": unit,
-        "x": significant(x[shown].tolist(), 6),
-        "y": significant(y[shown].tolist(), 5),
-    }

@@ -13,6 +13,7 @@ from starlette.routing import Route
 
 from winchkit.fleet.web.fleet import Fleet
 from winchkit.fleet.web.runs import Library
+from winchkit.web.channels import TIME
 from winchkit.web.views import Order, View
 from winchkit.web.workspace import DiagnoseView
 
@@ -57,7 +58,8 @@ class LibraryView(View):
     async def _overlay(self, request: Request) -> Response:
         query = request.query_params
         wanted, channel = query.getlist("name"), query.get("channel", "tension")
-        return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel))
+        over = query.get("over", TIME)
+        return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel, over))
 
     async def _fleet(self, request: Request) -> Response:
         return JSONResponse(await asyncio.to_thread(self.fleet.view))

@@ -67,7 +67,11 @@ def error_text(diagnosis: Diagnosis) -> str:
         return f"{'; '.join(wrong)}."
     if not diagnosis.steps:
         name = next(iter(worst_outputs(outputs)), "")
-        return f"Held-out error: {size_texts(outputs)[name]}." if name else ""
+        if not name:
+            return ""
+        is_named = OUTPUT_NAMES.get(name, name) in headline(diagnosis)
+        subject = "It" if is_named else f"The {OUTPUT_NAMES.get(name, name)} error"
+        return f"{subject} is {size_texts(outputs)[name]}."
     first, *others = diagnosis.steps
     either = len(first.effects) > 1 and not first.whole
     opening = "With them" if others else "With either" if either else "With it"

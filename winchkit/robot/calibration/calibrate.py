@@ -527,7 +527,7 @@ def _warnings(
         out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
     if observed.weak:
         out.append(
-            f"{observed.weak} of {observed.free} directions of the parameters have more "
-            "information from the prior than from the data"
+            f"{observed.weak} of {observed.free} parameter combinations rest on the assumed "
+            "values; more poses would settle them"
         )
     return tuple(out)

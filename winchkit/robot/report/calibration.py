@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import degrees, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from winchkit.quantity_text import quantity
+from winchkit.quantity_text import quantity, scale_for
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.html.markup import Markup, element, folded, table
 from winchkit.report.html.page import figure_block, page
@@ -84,7 +85,8 @@ def headline(found: Calibrated) -> str:
     before, after = found.validation_before.distance, found.validation_after.distance
     if not isfinite(rms(after)):
         return "The robot is calibrated; no pose was held out"
-    return f"Pose error falls from {quantity(rms(before), 'm')} to {quantity(rms(after), 'm')}"
+    scale = scale_for(rms(before), "m")
+    return f"Pose error falls from {scale.span(rms(before), rms(after))}"
 
 
 def _decides(following: Sequence[NextPose], blind: Sequence[str]) -> str:
@@ -110,15 +112,17 @@ def largest_changes(found: Calibrated) -> list[list[str]]:
     rows = []
     for name, estimate in ranked:
         nominal, value, sigma, unit = in_words(estimate)
-        shown = f"{value} ± {sigma} {unit}".replace("-", "−")
-        rows.append([_readable(name), shown, nominal.replace("-", "−")])
+        change = in_words(replace(estimate, value=estimate.value - estimate.nominal))[1]
+        signed = change if change.startswith("-") else f"+{change}"
+        texts = f"{signed} ± {sigma} {unit}", f"{nominal} to {value}"
+        rows.append([_readable(name), *(text.replace("-", "−") for text in texts)])
     return rows
 
 
 def _changes(found: Calibrated) -> Markup:
     return table(
-        "Largest changes, with the nominal value.",
-        ["parameter", "value", "nominal"],
+        "Largest changes, and the values before and after.",
+        ["parameter", "change", "from, to"],
         largest_changes(found),
     )
 

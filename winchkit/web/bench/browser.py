@@ -21,6 +21,7 @@ from winchkit.schema.programme import ALL
 from winchkit.web.bench import messages
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
+from winchkit.web.words import page_text
 
 BEGINS_NOTHING = frozenset(
     {"show", "leave", "release", "alive", "programme", "end_programme", "end_record"}
@@ -100,7 +101,7 @@ class Browser:
     def say(self, words: str) -> None:
         """Answer an order; words that repeat are said again."""
         if words or self.said["text"]:
-            self.said = {"number": self.said["number"] + 1, "text": words}
+            self.said = {"number": self.said["number"] + 1, "text": page_text(words)}
 
     @property
     def undo_tare(self) -> list[str]:

@@ -46,6 +46,7 @@ from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
 from winchkit.web.views import attachment
+from winchkit.web.words import free_path
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -184,6 +185,7 @@ class BenchView:
                 "winch": {name: self._model.declared(name) for name in self.spec.winch},
                 "robot": None if self.spec.robot is None else self.spec.robot.profile,
                 "dead_man": DEAD_MAN,
+                "log": free_path(Path.cwd(), "bench.csv").name,
             }
         )
 

@@ -12,7 +12,7 @@ import { card, lengthOf, picture as drawn, words as said } from "./winch.js";
 
 // Values that are older than `OLD` ms, twenty pictures, are grey, and nothing is offered.
 const PERIOD = 50, OLD = 1000, LOOK = 250, ANSWER = 3000, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -21,6 +21,7 @@ export async function station(state) {
     const found = await ask("/api/bench");
     history = await ask("/api/bench/history");
     declared = found;
+    logName = found.log;
     winch = Object.keys(declared.winch)[0];
     link = socket("/live/bench", receive, () => { cut = true; answers = 0; look(); });
     setInterval(look, LOOK);
@@ -174,7 +175,7 @@ function header() {
 let logged = null;
 function recording(chip, log) {
   const time = log && `${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}`;
-  chip.textContent = log ? `● ${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
+  fill(chip, el("i", {}, "●"), log ? `${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "");
   chip.hidden = !log;
   if (logged && !log) {
     alarm(`Recorded: ${logged.path}, ${logged.rows ?? "no"} rows.`, "recorded");
@@ -186,6 +187,10 @@ function recording(chip, log) {
 }
 
 const words = (state) => said(state, tripped().length > 0);
+// States of a drive (CiA 402) in words; its own name for the state is the tooltip.
+const OFF = ["not ready to switch on", "switch on disabled", "ready to switch on", "switched on"];
+const DRIVE = { ...Object.fromEntries(OFF.map((name) => [name, "drive off"])), "operation enabled": "drive on", "quick stop active": "quick stop", fault: "drive fault", "fault reaction active": "drive fault" };
+const by = (name) => (!name || commands() ? "" : name.startsWith("page ") ? "commanded from another tab" : `commanded by ${name}`);
 const drum = (name) => (picture && picture.status.drum && picture.status.drum[name]) || { turns: null, radius: null, guide: null };
 
 function show() {
@@ -229,7 +234,7 @@ function build() {
   const file = el("input", { class: "file", value: logName, onchange: (event) => { logName = event.target.value; }, "aria-label": "Name of the log" });
   keep();
   fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
-    el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => chooseWinch(name) }, name))),
+    el("div", { class: "row context" }, names.length > 1 ? [el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => chooseWinch(name) }, name)))] : null,
       el("span", { class: "segments", id: "tabs" }, tabs().map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
       el("span", { class: "row end offers" }, el("span", { id: "says", class: "note" }),
         declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
@@ -383,7 +388,7 @@ function refresh() {
   offer();
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
-  document.getElementById("says").textContent = picture && picture.commander && !commands() && !old() ? `${picture.commander} commands` : "";
+  document.getElementById("says").textContent = picture && !old() ? by(picture.commander) : "";
   const log = picture && picture.recording;
   const record = document.getElementById("record"), mine = commands() || Boolean(log);
   const named = document.querySelector(".context input.file");
@@ -399,7 +404,7 @@ function refresh() {
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
   renew(values, cell(state.length_known === false ? `Cable length unknown: home the winch; ${own.unhomed ? "held jogs only" : "no jogs"}` : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
-    el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
+    el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note", title: state.state }, [DRIVE[state.state] || state.state, by(state.commander)].filter(Boolean).join(" · "))));
   renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
   const host = document.getElementById("cycles");
   if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);

@@ -1,5 +1,6 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
 import { ask, attempt, closeDialog, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
+import { channelPanel } from "./channels.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
@@ -9,7 +10,7 @@ import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
 // The output that the ladder proposes has the focus until another is chosen, and after an addition.
-let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, earlier = null, drawnCurve = null, wanted = null;
+let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, over = [], earlier = null, drawnCurve = null, wanted = null;
 
 export function enter(main, state) { root = main; shown = wanted || { effect: null, output: null, chosen: false }; wanted = null; brushed = null; waiting = []; update(state); }
 
@@ -58,7 +59,7 @@ function render() {
       open && shown.effect && next(),
       el("section", { class: `panel ${narrow ? "w8" : "w7"}`, id: "time", "aria-label": "Measured and predicted" }),
       el("section", { class: `panel ${narrow ? "w12 low" : "w5"}`, id: "over", "aria-label": "Residual against each variable" }),
-      el("section", { class: "panel w12", id: "data" })));
+      el("section", { class: "panel w12", id: "data" })), channelPanel(view));
     drawLadder(); drawTime(); drawMultiples(); drawData();
     if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
     if (shown.effect) drawCard();
@@ -66,7 +67,7 @@ function render() {
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; shown.chosen = true; span = null; render(); } }, output.replaceAll("_", " ")));
-    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
+    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })), channelPanel(view));
     drawTime();
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with: drum, gearbox, cable and pulleys."),
     el("div", { class: "row" }, el("button", { class: "primary", onclick: () => newProfile() }, "New profile…"), el("button", { onclick: chooseProfile }, "Choose a profile…"))));
@@ -202,7 +203,7 @@ function drawLadder() {
 
 function focusOfSides(output) { shown.output = output; shown.chosen = true; address(); render(); }
 matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#ladder")) drawLadder(); });
-function focus(output) { shown.output = output; shown.chosen = true; span = null; brushed = null; waiting = []; address(); drawLadder(); drawTime(); drawMultiples(); }
+function focus(output) { shown.output = output; shown.chosen = true; span = null; over = []; brushed = null; waiting = []; address(); drawLadder(); drawTime(); drawMultiples(); }
 function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
 // The address: output, candidate, the seconds that are shown, and the profile beside.
 function address() {
@@ -347,10 +348,11 @@ async function drawMultiples() {
   const box = root.querySelector("#over"), output = shown.output;
   if (!box) return;
   await attempt(async () => {
-    const found = await ask(`/api/multiples?output=${output}`);
+    const found = await ask(`/api/multiples?output=${output}${over.map((name) => `&over=${encodeURIComponent(name)}`).join("")}`);
     if (output !== shown.output || !box.isConnected) return;
-    const grid = el("div", { class: "multiples" });
-    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), exporter(`${output}-residual`, () => multiplesFigure(found))), grid);
+    const grid = el("div", { class: "multiples" }), drawnOver = found.panels.map((panel) => panel.variable), others = found.variables.filter(([name]) => !drawnOver.includes(name));
+    const another = others.length ? el("select", { class: "another", "aria-label": "Another variable", onchange: () => { over = [another.value, ...drawnOver.slice(0, -1)]; drawMultiples(); } }, el("option", { value: "" }, "Over…"), others.map(([name, words]) => el("option", { value: name }, words))) : null;
+    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), el("span", { class: "row end" }, another, exporter(`${output}-residual`, () => multiplesFigure(found)))), grid);
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });

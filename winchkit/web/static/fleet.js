@@ -30,8 +30,7 @@ export function update(fresh, before) {
 
 const day = (time) => new Date(1000 * time).toISOString().slice(0, 10);
 const words = (name) => name.replaceAll("-", " ").replaceAll("_", " ");
-const capital = (text) => `${text[0].toUpperCase()}${text.slice(1)}`;
-const title = (own) => `${capital(words(own.effect))}, ${words(own.parameter)}`;
+const title = (own) => `${own.name}, ${words(own.parameter)}`;
 const many = (count, word) => `${count} ${word}${count === 1 ? "" : word.endsWith("ch") ? "es" : "s"}`;
 
 function render() {
@@ -51,7 +50,7 @@ function render() {
 function context() {
   const profile = el("input", { value: found.profile || (state.profile ? state.profile.name : ""), size: 22, placeholder: "name, file or folder", "aria-label": "Profile of the fleet" });
   const effects = el("input", { value: found.fitted ? found.fitted.effects.join(", ") : "", size: 22, placeholder: "those that are named", "aria-label": "Effects to follow" });
-  const fit = () => attempt(() => order("fleet", { profile: profile.value.trim(), effects: effects.value.split(/[\s,]+/).filter(Boolean) }));
+  const fit = () => attempt(() => { if (!profile.value.trim()) throw new Error("No profile is given. Type the name of a profile, a file, or a folder with WINCH.toml for each winch."); return order("fleet", { profile: profile.value.trim(), effects: effects.value.split(/[\s,]+/).filter(Boolean) }); });
   return el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${many(found.sessions, "session")}, ${found.diagnosed} diagnosed`),
     el("span", { class: "row end" }, el("label", { class: "row" }, "Profile", profile), el("label", { class: "row" }, "Effects", effects), el("button", { class: "primary", disabled: !found.indexed || Boolean(state.busy), onclick: fit }, found.fitted ? "Fit again" : "Fit all sessions")));
 }
@@ -145,11 +144,11 @@ function choose(p, w, s) {
 function drawSeries() {
   const box = root.querySelector("#series");
   if (!box || !picked) return;
-  const own = found.fitted.parameters[picked.p], winch = own.winches[picked.w], W = 340, H = 200, LEFT = 46;
+  const own = found.fitted.parameters[picked.p], winch = own.winches[picked.w], W = 340, H = 200;
   const known = winch.values.map((v, i) => [winch.times[i], v, winch.stds[i]]), whole = ends();
-  const low = Math.min(own.common, ...known.map(([, v, s]) => v - 2 * s)), high = Math.max(own.common, ...known.map(([, v, s]) => v + 2 * s)), span = high - low || 1;
+  const low = Math.min(own.common, ...known.map(([, v, s]) => v - 2 * s)), high = Math.max(own.common, ...known.map(([, v, s]) => v + 2 * s)), span = high - low || 1, ticks = steps(low, high), LEFT = 14 + 7 * Math.max(...ticks.map((v) => number(v, 3).length));
   const X = (t) => LEFT + 6 + ((t - whole[0]) / (whole[1] - whole[0] || 1)) * (W - LEFT - 18), Y = (v) => H - 26 - ((v - low) / span) * (H - 40);
-  const parts = steps(low, high).flatMap((v) => [svg("line", { x1: LEFT, x2: W - 4, y1: Y(v), y2: Y(v), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: Y(v) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(v, 3))]);
+  const parts = ticks.flatMap((v) => [svg("line", { x1: LEFT, x2: W - 4, y1: Y(v), y2: Y(v), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: Y(v) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(v, 3))]);
   const sigma = Math.hypot(own.session_std, own.common_std);
   parts.push(svg("rect", { x: LEFT, width: W - LEFT - 4, y: Y(Math.min(high, own.common + sigma)), height: Math.max(1, Y(Math.max(low, own.common - sigma)) - Y(Math.min(high, own.common + sigma))), fill: "var(--band)" }), svg("line", { x1: LEFT, x2: W - 4, y1: Y(own.common), y2: Y(own.common), stroke: "var(--edge)", "stroke-dasharray": "4 3" }));
   if (winch.change) {
@@ -163,7 +162,7 @@ function drawSeries() {
   });
   parts.push(svg("text", { x: LEFT, y: H - 4, fill: "var(--muted)" }, day(whole[0])), svg("text", { x: W - 4, y: H - 4, "text-anchor": "end", fill: "var(--muted)" }, day(whole[1])));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${H}`, "font-size": 12, role: "img", "aria-label": `Estimates of ${winch.winch} over time` }, parts);
-  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${words(own.effect)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), drawn,
+  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), drawn,
     el("div", { class: "row" }, el("span", { class: "note" }, "± one standard deviation; dashed: common value"), drawingExporter(`${winch.winch}-${own.effect}`.replaceAll("/", "-"), `${winch.winch}: ${title(own)}`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), [["date", winch.times.map(day)], [`value [${own.unit}]`, winch.values], [`std [${own.unit}]`, winch.stds]])),
     winch.texts.map((text) => el("p", { class: "note" }, text)), winch.texts.length ? null : el("p", { class: "note" }, "No change, and no difference from the others."),
     el("div", { class: "buttons" }, el("button", { onclick: behind }, `Runs of ${day(winch.times[picked.s])}`)));

@@ -20,7 +20,7 @@ export function counted({ rows, candidates }) {
 // without `choose` the candidates are names, without `focus` the heads.
 export function ladderGrid({ columns, rows }, { output, effect, only, most, present, focus, choose }) {
   const seen = only ? columns.filter((c) => c.output === output) : columns;
-  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 270px) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
+  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, min(270px, 52%)) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
   grid.append(el("span", {}));
   for (const c of seen) grid.append(el("button", { class: `head ${c.output === output ? "focus" : ""}`, "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
   const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);

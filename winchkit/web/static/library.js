@@ -1,23 +1,22 @@
 // The Library view: runs of the folder in sets, overlaid, opened in Diagnose; and the fleet.
-import { ask, attempt, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
-import { exporter } from "./figures.js";
+import { ask, attempt, el, fill, icon, number, order, svg } from "./page.js";
+import { MOST as MOST_LINES, TIME, choice, drawLines } from "./channels.js";
 import * as fleet from "./fleet.js";
-import { line, plot } from "./plots.js";
 
-const MOST = 300, TONES = ["with", "today", "brush", "ok", "muted", "unknown", "warn", "ink"];
+const MOST = 300;
 const MARKS = { cable_length: "square", tension: "ring", motor_torque: "triangle" };
 const NAMES = { cable_length: "cable length", tension: "tension", motor_torque: "motor torque" };
 
-let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new Set(), channel = "tension", filter = "", verdict = "", part = "runs", faultsOpen = false;
+let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new Set(), channel = "tension", over = TIME, filter = "", verdict = "", part = "runs", faultsOpen = false;
 
 export function enter(main, fresh) { root = main; state = fresh; root.removeAttribute("data-signature"); load(); }
 export function update(fresh) { const before = state; state = fresh; if (part === "fleet") fleet.update(fresh, before); }
 export function restore(parts) {
-  const [kind, words, judgement, shown] = parts.map(decodeURIComponent);
-  part = kind === "fleet" ? "fleet" : "runs"; filter = words || ""; verdict = judgement || ""; channel = shown || channel;
+  const [kind, words, judgement, shown, across] = parts.map(decodeURIComponent);
+  part = kind === "fleet" ? "fleet" : "runs"; filter = words || ""; verdict = judgement || ""; channel = shown || channel; over = across || TIME;
 }
-// The address: runs or fleet, the filter, the verdict, and the channel that is laid over.
-function address() { history.replaceState(null, "", `${location.pathname}${location.search}#library/${part === "fleet" ? "fleet" : ["runs", filter, verdict, channel].map(encodeURIComponent).join("/")}`); }
+// The address: runs or fleet, the filter, the verdict, the channel that is laid over, and its x axis.
+function address() { history.replaceState(null, "", `${location.pathname}${location.search}#library/${part === "fleet" ? "fleet" : ["runs", filter, verdict, channel, ...(over === TIME ? [] : [over])].map(encodeURIComponent).join("/")}`); }
 
 async function load() {
   fill(root, el("div", { class: "row context" }, el("span", { class: "label" }, "Reading the folder")));
@@ -36,7 +35,7 @@ function render() {
   const search = el("input", { type: "search", placeholder: "filter: name, load, winch, date", value: filter, "aria-label": "Filter runs", oninput: () => { filter = search.value; again(); } });
   const verdicts = [...new Map(found.runs.filter((run) => run.verdict).map((run) => [run.verdict.verdict, run.verdict.chip]))];
   const judged = verdicts.length ? el("select", { "aria-label": "Verdict", onchange: () => { verdict = judged.value; again(); } }, [["", "any verdict"], ...verdicts].map(([value, words]) => el("option", { value, selected: value === verdict }, words))) : null;
-  const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; address(); overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
+  const pick = [choice("Channel", channels, channel, (name) => { channel = name; address(); overlay(); }), el("span", { class: "label" }, "over"), choice("Over", [TIME, ...channels], over, (name) => { over = name; address(); overlay(); })];
   const readable = found.runs.filter((run) => !run.fault).length;
   const outputs = [...new Set(found.runs.flatMap((run) => (run.verdict ? Object.keys(run.verdict.ratios) : [])))];
   fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${readable} run${readable === 1 ? "" : "s"} in ${sets().length} set${sets().length === 1 ? "" : "s"}`), search, judged,
@@ -44,7 +43,7 @@ function render() {
   el("div", { class: "grid" }, el("section", { class: "panel w8 scroll", "aria-label": "Runs" },
     el("table", { class: "rows library" }, el("thead", {}, el("tr", {}, ["", "Set, run", "Programme", "Load", "Duration", "Error ÷ noise", "Verdict"].map((text, i) => el("th", { class: i === 4 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body),
     outputs.length ? el("div", { class: "legend below" }, outputs.map((name) => el("span", {}, svg("svg", { width: 14, height: 12, "aria-hidden": "true" }, mark(name, 7, 6)), NAMES[name] || name)), el("span", {}, "line on the left: noise floor")) : el("p", { class: "note below" }, "A verdict is shown for runs that were diagnosed: on this page, or by winchkit fleet diagnose.")),
-  el("section", { class: "panel w4 beside", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), el("label", { class: "row end" }, el("span", { class: "visually-hidden" }, "Channel"), pick)), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs on the left.")))));
+  el("section", { class: "panel w4 beside", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), channels.length ? el("span", { class: "row end" }, pick) : null), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs of the list.")))));
   overlay();
 }
 
@@ -119,25 +118,9 @@ function shapes(ratios) {
 
 async function overlay() {
   const box = document.getElementById("overlay");
-  if (!box || !chosen.size) { if (box) fill(box, el("p", { class: "note" }, "Choose runs on the left.")); return; }
-  const names = [...chosen].slice(0, TONES.length);
-  await attempt(async () => {
-    const { lines, difference } = await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&${names.map((name) => `name=${encodeURIComponent(name)}`).join("&")}`);
-    if (!lines.length) { fill(box, el("p", { class: "note" }, `None of these runs has ${channel}.`)); return; }
-    const host = el("div", { class: "plot" }), toned = lines.map((own, i) => ({ name: own.name, tone: TONES[i % TONES.length] })), words = channel.replaceAll("_", " ");
-    const figure = () => ({ title: `${channel}, each run from its own start`, source: sourceOf(`folder ${found.folder}`), legend: toned, height: 320,
-      panels: [{ title: `${channel} [${lines[0].unit}]`, xLabel: "time [s]", series: lines.map((own, i) => ({ ...toned[i], name: `${own.name} [${own.unit}]`, x: own.x, y: own.y })) },
-        ...(difference ? [{ title: `Difference [${difference.unit}]`, xLabel: "time [s]", series: [{ name: `${difference.name} [${difference.unit}]`, x: difference.x, y: difference.y, tone: "ink" }] }] : [])] });
-    fill(box, el("div", { class: "legend column" }, lines.map((own, i) => el("span", {}, el("i", { style: { background: `var(--${TONES[i % TONES.length]})` } }), own.name))),
-      el("h3", { class: "row" }, `${words[0].toUpperCase()}${words.slice(1)}`, el("span", { class: "note" }, `${lines[0].unit}, each from its own start${chosen.size > TONES.length ? `, the first ${TONES.length}` : ""}`), exporter(`overlay-${channel}`, figure)), host);
-    const data = uPlot.join(lines.map((own) => [own.x, own.y]));
-    const style = (i) => line(TONES[i % TONES.length], 1.4, 1, { spanGaps: true, ...(i >= TONES.length / 2 ? { dash: [6, 3] } : {}) });
-    plot(host, data, lines.map((_, i) => style(i)), { height: difference ? 200 : 320, xLabel: "s", sync: "library", names: lines.map((own) => own.name.split("/").at(-1)), unit: lines[0].unit, label: `${channel} of ${lines.length} runs over time` });
-    if (!difference) return;
-    const below = el("div", { class: "plot" });
-    box.append(el("h3", { class: "row" }, "Difference", el("span", { class: "note" }, `${difference.unit}, ${difference.name}`)), below);
-    plot(below, [difference.x, difference.y], [line("ink", 1.4)], { height: 140, xLabel: "s", sync: "library", names: ["difference"], unit: difference.unit, label: `Difference of the ${channel} over time` });
-  });
+  if (!box || !chosen.size) { if (box) fill(box, el("p", { class: "note" }, "Choose runs of the list.")); return; }
+  const names = [...chosen].slice(0, MOST_LINES).map((name) => `&name=${encodeURIComponent(name)}`).join("");
+  await attempt(async () => drawLines(box, await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&over=${encodeURIComponent(over)}${names}`), `folder ${found.folder}`, chosen.size > MOST_LINES ? `the first ${MOST_LINES} runs` : ""));
 }
 
 export function keys(event) {

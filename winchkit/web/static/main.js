@@ -12,8 +12,10 @@ let state = null, name = null;
 
 function route() {
   const [wanted, ...parts] = location.hash.replace(/^#/, "").split("/");
-  const next = views[wanted] ? wanted : "diagnose";
-  if (next === name || !state) return;
+  if (!state) return;
+  // Without a view in the address a page with a bench and no runs shows the bench.
+  const next = views[wanted] ? wanted : state.bench && !state.runs.length ? "bench" : "diagnose";
+  if (next === name) return;
   if (name && views[name].leave) views[name].leave();
   alarm("", "order");
   name = next;

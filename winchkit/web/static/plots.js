@@ -1,12 +1,13 @@
 // Curves by uPlot with the page's colours: axis at the bottom, hairlines, zoom, pan, brush, export.
 import { colour, el, number } from "./page.js";
 
-const FONT = "12px Inter, system-ui, sans-serif";
+const FONT = "12px Inter, system-ui, sans-serif", RIGHT = 10, LEAST_LEFT = 60;
 
-// Ticks as text, the unit beside the last one.
-function label(ticks, unit, words) {
-  const shown = ticks.map((tick) => (tick === null ? "" : words(tick)));
-  const last = shown.findLastIndex((text) => text !== "");
+// Ticks as text, the unit beside the last one whose text then still ends within the plot.
+function label(u, ticks, unit, words) {
+  const shown = ticks.map((tick) => (tick === null ? "" : words(tick))), { min, max, distr } = u.scales.x, at = (value) => (distr === 3 ? Math.log10(value) : value);
+  const room = (tick) => RIGHT + ((at(max) - at(tick)) / (at(max) - at(min) || 1)) * (u.width - LEAST_LEFT - RIGHT);
+  const last = shown.findLastIndex((text, i) => text !== "" && 3.3 * (text.length + 1 + unit.length) <= room(ticks[i]));
   return shown.map((text, index) => (index === last && unit ? `${text} ${unit}` : text));
 }
 
@@ -28,7 +29,7 @@ function axes(xLabel, logarithmic, flat, left) {
   const ink = () => colour("muted");
   return [
     { stroke: ink, font: FONT, size: 26, space: (u, axis, low, high, width) => Math.max(flat ? 34 : 64, width / 7), grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
-      ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(ticks, xLabel, logarithmic ? power : number) },
+      ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(u, ticks, xLabel, logarithmic ? power : number) },
     { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => steps(ticks) },
   ];
@@ -69,19 +70,23 @@ function marks(runs) {
   };
 }
 
-// Means over bins as lines, broken where no sample lies between two bins.
+// Means over bins as lines, broken where no sample lies between two bins; `timed` ones, in the order
+// of time, are broken where a value is missing.
 function traced(traces) {
   return (u) => {
     const { ctx, bbox } = u;
     ctx.save();
     ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
-    for (const { x, y, tone, width } of traces) {
+    for (const { x, y, tone, width, timed } of traces) {
       const steps = x.slice(1).map((value, i) => value - x[i]).sort((a, b) => a - b), wide = 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
       ctx.strokeStyle = colour(tone); ctx.lineWidth = width * devicePixelRatio; ctx.lineJoin = "round";
       ctx.beginPath();
+      let pen = false;
       x.forEach((value, i) => {
+        if (value === null || y[i] === null) { pen = false; return; }
         const at = [u.valToPos(value, "x", true), u.valToPos(y[i], "y", true)];
-        if (i === 0 || (u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+        if (!pen || (!timed && u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+        pen = true;
       });
       ctx.stroke();
     }
@@ -135,7 +140,7 @@ export function plot(host, data, series, { names = [], unit = "", height, xLabel
     if (select) select(low, high); else if (zoom) { u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false); zoom(low, high); }
   };
   const options = {
-    width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, bare ? 8 : 0, 0],
+    width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, RIGHT, bare ? 8 : 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
     scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: { range: (u, low, high) => held.get(label) || (range ? range(u, low, high) : low === null ? [null, null] : uPlot.rangeNum(low, high, 0.1, true)) } },
     axes: axes(xLabel, logarithmic, flat, left).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],

@@ -43,9 +43,16 @@ const todayOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === 
 const floorOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === "floor").cells;
 const text = (cell) => (cell ? cell.text : "–");
 
+// Colours of both sides: that of the better model for the smaller error above its noise floor.
+function tones(view, output) {
+  const [a, b] = sidesOf(view).map((side) => (todayOf(side)[output] || {}).ratio ?? Infinity);
+  return a < b ? ["with", "today"] : ["today", "with"];
+}
+
 function headline(view, output) {
   const { name, unit } = view.diagnosis.ladder.columns.find((c) => c.output === output), [a, b] = sidesOf(view).map((side) => text(todayOf(side)[output]));
-  return `${name} error ${a} ${unit} with A, ${b} ${unit} with B`;
+  const [first, second] = tones(view, output).map((tone) => (tone === "with" ? "after" : "before"));
+  return [`${name} error `, el("b", { class: first }, `${a} ${unit}`), " with A, ", el("b", { class: second }, `${b} ${unit}`), " with B"];
 }
 
 function errors(view, output, focus) {
@@ -56,12 +63,14 @@ function errors(view, output, focus) {
   return el("div", { class: "scroll" }, el("table", { class: "sides" }, el("thead", {}, el("tr", {}, ["Held-out error", "A", "noise floor A", "A ÷ floor", "B", "noise floor B", "B ÷ floor"].map((words, i) => el("th", { class: `${i ? "number" : ""} ${i % 3 === 2 ? "wide" : ""}` }, words)))), el("tbody", {}, rows)));
 }
 
+// A comparison that was ended meanwhile needs no answer.
+const besides = (boxes, action) => attempt(async () => { try { await action(); } catch (error) { if (boxes[0].isConnected) throw error; } });
 const answers = (view, path) => Promise.all(sidesOf(view).map((side, i) => ask(`${path}${i ? "&beside=1" : ""}`)));
 const ends = (values) => values.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
 const wider = ([low, high]) => [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)];
 
 async function drawTimes(view, output, boxes) {
-  await attempt(async () => {
+  await besides(boxes, async () => {
     const width = Math.max(300, boxes[0].clientWidth - 32), part = span ? `&from=${span[0]}&to=${span[1]}` : "";
     const found = await answers(view, `/api/curve?output=${output}&points=${Math.round(2 * width)}${part}`);
     if (!boxes[0].isConnected) return;
@@ -73,7 +82,7 @@ async function drawTimes(view, output, boxes) {
       clearTimeout(zoom.timer); zoom.timer = setTimeout(() => drawTimes(view, output, boxes), 60);
     };
     found.forEach((data, i) => {
-      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = ["today", "with"][i], label = `${"AB"[i]}: ${data.name}`;
+      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = tones(view, output)[i], label = `${"AB"[i]}: ${data.name}`;
       const figure = () => ({ title: `${label}, measured and predicted, and the residual`, source: source(side), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone }, { name: "noise floor ±1σ", tone: "edge" }],
         panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
           { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
@@ -85,14 +94,14 @@ async function drawTimes(view, output, boxes) {
 }
 
 async function drawOver(view, output, boxes) {
-  await attempt(async () => {
+  await besides(boxes, async () => {
     const most = await answers(view, `/api/multiples?output=${output}`);
     const shares = most.flatMap((own) => own.panels).sort((a, b) => b.share - a.share), names = [...new Set(shares.map((panel) => panel.variable))].slice(0, 3);
     const found = await answers(view, `/api/multiples?output=${output}${names.map((name) => `&over=${name}`).join("")}`);
     if (!boxes[0].isConnected) return;
     const range = sym(found.flatMap((own) => own.residual));
     found.forEach((own, i) => {
-      const grid = el("div", { class: "multiples" }), tone = ["today", "with"][i];
+      const grid = el("div", { class: "multiples" }), tone = tones(view, output)[i];
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, `${"AB"[i]}: residual against each variable`), el("span", { class: "note" }, "share of variance")), grid);
       for (const name of names) {
         const pair = found.map((each) => each.panels.find((panel) => panel.variable === name)), panel = pair[i];
