@@ -158,7 +158,9 @@ def test_rivals_are_shown_with_the_run_that_separates_them() -> None:
     found = saying(diagnosis_of("explained", FRICTION, next_runs=runs))
     short = " ".join(report_text(found).split())
     assert "? these runs cannot distinguish it from pulley-capstan" in short
-    assert "To decide between pulley-coulomb and pulley-capstan: full stroke, twice the load" in short
+    assert (
+        "To decide between pulley-coulomb and pulley-capstan: full stroke, twice the load" in short
+    )
     long = report_text(found, verbose=True)
     assert "pulley-coulomb / pulley-capstan  0.1° between signatures" in long
     assert "change a wrap angle" in [line.rpartition(": ")[2] for line in long.splitlines()]

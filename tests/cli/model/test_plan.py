@@ -53,7 +53,7 @@ def test_the_plan_is_a_programme_that_distinguishes_them(fat: list[Path], tmp_pa
         o["minutes"] for o in told["offers"] if o["separates"][0]["power"] > 0.9
     )
     programme = read_programme(next_file)
-    assert programme.repeat == 2
+    assert programme.repeat == 1, "the runs so far have repeats"
     reached = [step.to for step in programme.step if step.to is not None]
     assert min(reached) == pytest.approx(1.5, abs=0.01)
     assert max(reached) == pytest.approx(2.8, abs=0.01)
