@@ -65,7 +65,13 @@ def _lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     width = max((len(row["winch"]) for row in rows), default=0)
     for row in rows:
         mass = "" if row["load_mass"] is None else f"{row['load_mass']:g} kg"
-        facts = (row["programme"], mass, row["fault"], "" if row["complete"] else "no end")
+        facts = (
+            row["programme"],
+            mass,
+            row["verdict"],
+            row["fault"],
+            "" if row["complete"] else "no end",
+        )
         known = "  ".join(fact for fact in facts if fact)
         moment: datetime = row["time"]
         yield f"{row['winch']:<{width}}  {moment:%Y-%m-%d %H:%M}  {row['path']}  {known}"

@@ -25,15 +25,15 @@ from winchkit.runs.importing.orientation import (
 )
 from winchkit.runs.importing.source_stamps import SOURCE_STAMP
 from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
-from winchkit.runs.importing.unit_spelling import (
+from winchkit.runs.importing.units.known import (
     BRIDGE,
     COUNT_RATE,
     COUNTS,
     SHARE,
     SpelledUnit,
-    named_unit,
-    read_unit,
+    is_exact,
 )
+from winchkit.runs.importing.units.spelling import named_unit, read_unit
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.linear_axis import CHANNELS, ROTARY
 from winchkit.schema.mapping import ANGLES, DATE, MATRIX, POSE_DIMENSIONS, QUATERNION
@@ -220,6 +220,9 @@ def _by_name(
         return _by_unit(column, unit)
     if fits:
         return ChannelCandidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
+    if not is_exact(column.unit):
+        # In capital letters it would be of another quantity: knots, nanometres.
+        return ChannelCandidate(column, channel, meaning.rank, None, f"'{meaning.text}'")
     found = _by_unit(column, unit)
     return replace(found, rank=_BY_RANK) if found.channel else found
 
