@@ -27,6 +27,7 @@ _CALLS = {
     "Log": "read_log(paths)",
     "MeasuredPoses": "read_poses(runs, profile)",
     "Programme": "read_programme(path)",
+    "PulleyRecord": "record_of(run, profile)",
     "Removal": "remove(effect, runs, profile)",
     "Robot": "robot_of(profile)",
     "RobotAnswer": "diagnose(runs, profile)",
@@ -78,12 +79,19 @@ def require_each(winches: object, kind: type, name: str) -> None:
 
     Raises UsageError with the argument, the first wrong value and what to pass.
     """
-    if not isinstance(winches, Mapping):
-        raise UsageError(
-            f"{name} is {_shown(winches)}; pass a dict of lists of {kind.__name__} by winch"
-        )
-    for key, values in winches.items():
+    found = require_mapping(winches, name, f"lists of {kind.__name__} by winch")
+    for key, values in found.items():
         require_types(values, kind, f"{name}[{key!r}]")
+
+
+def require_mapping(values: object, name: str, what: str) -> Mapping[Any, Any]:
+    """The argument where it is a mapping, such as a dict; ``what``: contents of the one to pass.
+
+    Raises UsageError with the argument and its value.
+    """
+    if isinstance(values, Mapping):
+        return values
+    raise UsageError(f"{name} is {_shown(values)}; pass a dict of {what}")
 
 
 def path_of(value: object, name: str = "path") -> Path:

@@ -47,7 +47,7 @@ def command(
 ) -> None:
     """List the runs of an indexed folder, in the order of winch and time."""
     from winchkit.cli.core.quantities import quantity
-    from winchkit.fleet.library.query import library_runs
+    from winchkit.fleet.library.query import library_runs, verdicts_of
 
     rows = library_runs(
         folder,
@@ -58,6 +58,8 @@ def command(
         until=_day("--until", until),
         verdict=verdict,
     ).to_pylist()
+    judged = verdicts_of(folder)
+    rows = [{**row, "verdict": " and ".join(judged.get(row["path"], ())) or None} for row in rows]
     tell({"runs": rows}, _lines(rows))
 
 
@@ -68,7 +70,7 @@ def _lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         facts = (
             row["programme"],
             mass,
-            row["verdict"],
+            row["verdict"] or "",
             row["fault"],
             "" if row["complete"] else "no end",
         )

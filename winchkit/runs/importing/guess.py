@@ -95,7 +95,8 @@ def guess_columns(table: ColumnTable, answers: Answers | None = None) -> Guess:
     return Guess(
         table,
         tuple({**unused, **assigned}[column.source] for column in table.columns),
-        tuple(dict.fromkeys(work.questions)),
+        # The time first: of a file without it nothing else can be judged.
+        tuple(sorted(dict.fromkeys(work.questions), key=lambda item: item.key != "sample_rate")),
         tuple(dict.fromkeys(work.notes)),
         rate,
     )
