@@ -79,7 +79,7 @@ def verdicts_of(folder: str | Path) -> dict[str, tuple[str, ...]]:
     """Verdicts of the sessions that a run is of, by its path; runs of none are left out."""
     found: dict[str, tuple[str, ...]] = {}
     for row in indexed(folder).read("diagnoses", ("runs", "verdict")).to_pylist():
-        for path in row["runs"]:
+        for path in row["runs"] if row["verdict"] else ():
             found[path] = tuple(dict.fromkeys((*found.get(path, ()), row["verdict"])))
     return found
 
