@@ -69,7 +69,7 @@ class _Written(QuantityType):
     multiple=True,
     metavar="CHANNEL=COLUMN",
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
-    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, 'tau_a-tau_b' of several columns, "
+    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, '(tau_a-tau_b)/2' of several columns, "
     "'FILE:tension=2 [N]' of one file; nothing after = for none. May be given several times.",
 )
 @click.option(

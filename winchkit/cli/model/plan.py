@@ -24,7 +24,6 @@ from winchkit.cli.model.options import (
     suggest_with,
 )
 from winchkit.errors import UsageError, suggest
-from winchkit.runs.files import refuse_existing
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
@@ -71,6 +70,7 @@ def command(
     """
     from winchkit import wings
     from winchkit.diagnosis.profiles import require_winch
+    from winchkit.runs.files import refuse_existing
 
     declared = declared_profile(asked.source)
     if output is not None:
@@ -93,6 +93,7 @@ def _plan_winch(
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.runs.files import refuse_existing
     from winchkit.schema.profiles.axis import AxisProfile
     from winchkit.schema.programme import write_programme
 

@@ -36,7 +36,7 @@ class _Value:
     """Whether columns were added to others or to numbers."""
 
     @property
-    def factor_of(self) -> bool:
+    def is_scaled_column(self) -> bool:
         """Whether it is one column by a number."""
         return len(self.columns) == 1 and not self.is_sum
 
@@ -69,7 +69,7 @@ def scaled_column(table: ColumnTable, source: str) -> tuple[str, float] | None:
         found = _Parser(table, source).whole()
     except UsageError:
         return None
-    if not found.factor_of:
+    if not found.is_scaled_column:
         return None
     [column] = found.columns
     unit = replace(column, values=np.ones(1))

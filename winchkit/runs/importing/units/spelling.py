@@ -33,6 +33,8 @@ def read_unit(text: str) -> SpelledUnit | None:
     ``text``: spelling, e.g. ``1/min`` or ``(Nm)``. Returns: the case counts where two units differ
     by it only (``mN``, ``MN``).
     """
+    if len(text) > _LONGEST:
+        return None
     inner = _inner(text)
     # "V (Voltage)" and "A(rms)": a unit with a description.
     first = re.split(r"\s+\(", inner)[0]
