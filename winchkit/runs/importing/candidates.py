@@ -31,7 +31,7 @@ from winchkit.runs.importing.units.known import (
     COUNTS,
     SHARE,
     SpelledUnit,
-    is_exact,
+    is_of_two_quantities,
 )
 from winchkit.runs.importing.units.spelling import named_unit, read_unit
 from winchkit.runs.importing.winches import FEWEST, choose_channels
@@ -220,8 +220,7 @@ def _by_name(
         return _by_unit(column, unit)
     if fits:
         return ChannelCandidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
-    if not is_exact(column.unit):
-        # In capital letters it would be of another quantity: knots, nanometres.
+    if is_of_two_quantities(column.unit):
         return ChannelCandidate(column, channel, meaning.rank, None, f"'{meaning.text}'")
     found = _by_unit(column, unit)
     return replace(found, rank=_BY_RANK) if found.channel else found

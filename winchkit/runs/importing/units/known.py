@@ -173,6 +173,8 @@ _PER = (
     (re.compile(r"^(?!in_)([^\W_]+)_(s|sec|min)$"), r"\1/\2"),
 )
 """Spellings of a rate: ``deg per sec``, ``rad s⁻¹``, ``rad_s`` of names that have no slash."""
+_TWO_QUANTITIES = {"kn", "nm"}
+"""In small letters: knots beside kN, nanometres beside N m."""
 _AMBIGUOUS = {"grad", "tm"}
 """Without regard to case these are of two units: Grad and gradian."""
 
@@ -267,6 +269,6 @@ def known_unit(text: str) -> SpelledUnit | None:
     return _FOLDED.get(key.casefold()) if len(key) > 1 else None
 
 
-def is_exact(text: str) -> bool:
-    """Whether a known spelling is written with the capital letters that it has."""
-    return any(_key(spelling) in _KNOWN for spelling in (text, _rate(text)))
+def is_of_two_quantities(text: str) -> bool:
+    """Whether a spelling is also a unit of another quantity: knots, nanometres."""
+    return _key(text) in _TWO_QUANTITIES
