@@ -33,7 +33,7 @@ from winchkit.runs.importing.units.known import (
     SpelledUnit,
     is_of_two_quantities,
 )
-from winchkit.runs.importing.units.spelling import named_unit, read_unit
+from winchkit.runs.importing.units.spelling import named_unit, read_unit, unit_as_name
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.linear_axis import CHANNELS, ROTARY
 from winchkit.schema.mapping import ANGLES, DATE, MATRIX, POSE_DIMENSIONS, QUATERNION
@@ -197,6 +197,8 @@ def _candidate(
         return ChannelCandidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
     if linear and meaning is not None:
         meaning = replace(meaning, channel=_LINEAR.get(meaning.channel, meaning.channel))
+    if meaning is None and not column.unit:
+        unit = unit_as_name(column.name)
     found = _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
     return replace(found, channel=_LINEAR.get(found.channel, found.channel)) if linear else found
 
@@ -236,7 +238,9 @@ def _by_unit(column: FileColumn, unit: SpelledUnit | None) -> ChannelCandidate:
     """Channel of a dimension; the time of a first column without a name that increases."""
     channel = "" if unit is None else _BY_DIMENSION.get(unit.dimension, "")
     if channel and (channel != "time" or _is_clock(column)):
-        return ChannelCandidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
+        return ChannelCandidate(
+            column, channel, _BY_UNIT, unit, f"unit {column.unit or column.name}"
+        )
     if column.number == 1 and column.name.isdecimal() and _is_clock(column, steady=True):
         return ChannelCandidate(column, "time", _BY_ORDER, None, "first column, increasing")
     known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -65,6 +66,7 @@ def test_a_spelling_of_two_units_is_none(text: str) -> None:
         ("Position (1/10 mm)", "1/10 mm"),
         ("Load cell (500 N)", "500 N"),
         ("Position 1 deg", "deg"),
+        ("Torque (% of rated)", "% of rated"),
         ("speed_rad_s", "rad_s"),
         ("Force (Load Cell 1 (N))", "N"),
     ],
@@ -85,3 +87,16 @@ def test_the_size_of_one_is_asked_where_the_header_does_not_say_it(
     path.write_text(f"time [s],angle [rad],{header}\n{rows}\n")
     guess = guess_columns(read_table(str(path)))
     assert any("motor_velocity" in question.text for question in guess.questions), guess.questions
+
+
+def test_a_column_may_be_named_by_its_unit_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{10 * k},{k % 13},{k % 7},{k % 5}" for k in range(60))
+    path.write_text(f"ms,deg,rpm,min\n{rows}\n")
+    guess = guess_columns(read_table(str(path)))
+    found = {item.source: (item.channel, item.factor) for item in guess.assignments}
+    assert found["ms"] == ("time", 1e-3)
+    assert found["deg"] == ("motor_angle", pytest.approx(math.radians(1)))
+    assert found["rpm"] == ("motor_velocity", pytest.approx(TURN / 60))
+    assert found["min"][0] == ""
+    assert not guess.is_certain

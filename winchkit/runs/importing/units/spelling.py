@@ -36,8 +36,8 @@ def read_unit(text: str) -> SpelledUnit | None:
     if len(text) > _LONGEST:
         return None
     inner = _inner(text)
-    # "V (Voltage)" and "A(rms)": a unit with a description.
-    first = re.split(r"\s+\(", inner)[0]
+    # "V (Voltage)", "A(rms)" and "% of rated": a unit with a description.
+    first = re.split(r"\s+(?:\(|of\b)", inner)[0]
     for spelling in (inner, first):
         if (found := known_unit(spelling)) is not None:
             return found
@@ -150,6 +150,14 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     if word.casefold() in _PLAIN_WORDS:
         return known.dimension == COUNTS
     return word not in {"m", "s", "N", "V", "min"} or mark == "_"
+
+
+def unit_as_name(name: str) -> SpelledUnit | None:
+    """The unit that is all of a name: ``ms``, ``rpm``; None for words that are more than units."""
+    word = name.strip()
+    if len(word) < 2 or word.casefold() in {*_SHORT_WORDS, *_PLAIN_WORDS, "min"}:
+        return None
+    return read_unit(word)
 
 
 def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
