@@ -102,6 +102,7 @@ def choose(
             if found.channel in _SCALAR and column.name in vectors:
                 found = replace(found, rank=_BY_RANK, reason=f"{found.reason}, one of x, y, z")
             (free if found.channel else choice.unused).append(found)
+            choice.notes += _unread(column)
     taken = {item.channel for item in choice.chosen}
     free = _left_after(taken, free, choice)
     free = _left_after(without, free, choice, "has no column, by --column")
@@ -245,6 +246,21 @@ def _by_unit(column: FileColumn, unit: SpelledUnit | None) -> ChannelCandidate:
         return ChannelCandidate(column, "time", _BY_ORDER, None, "first column, increasing")
     known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"
     return ChannelCandidate(column, "", reason=known)
+
+
+def _unread(column: FileColumn) -> list[str]:
+    """Note on a column that is named like a channel and has text that seems to be numbers."""
+    meaning = None if column.texts is None else meaning_of(column.name, column.labels)
+    if column.texts is None or meaning is None or meaning.rank > 2:
+        return []
+    cells = [text for text in column.texts if text.strip()]
+    is_numeric = 2 * sum(any(map(str.isdigit, text)) for text in cells) > len(cells)
+    if meaning.channel in {IGNORED, CURRENT, "time", DATE} or not is_numeric:
+        return []
+    return [
+        f"'{column.source}' is named like {meaning.channel} and is left out: its cells are no "
+        f"numbers, e.g. '{cells[0]}'"
+    ]
 
 
 def _of_text(column: FileColumn) -> ChannelCandidate:
