@@ -169,7 +169,7 @@ _PER = (
     (re.compile(r"(?<=[^\W\d])[\s_]*\bper\b[\s_]*|(?<=[^\W\d])_per_"), "/"),
     (re.compile(r"/\s*(sec|secs|second|seconds|Sek|Sekunde)$"), "/s"),
     (re.compile(r"/\s*(minute|minutes|Minute)$"), "/min"),
-    (re.compile(r"(?<=[^\W\d])[\s·⋅∙*.^]*(?<![A-Za-z])(s|min|h|ms)\^?-1$"), r"/\1"),
+    (re.compile(r"(?<=[^\W\d]|[°º])[\s·⋅∙*.^]*(?<![A-Za-z])(s|min|h|ms)\^?-1$"), r"/\1"),
     (re.compile(r"^(?!in_)([^\W_]+)_(s|sec|min)$"), r"\1/\2"),
 )
 """Spellings of a rate: ``deg per sec``, ``rad s⁻¹``, ``rad_s`` of names that have no slash."""
