@@ -36,7 +36,8 @@ def test_simulated_runs_of_another_seed_replace_none(tmp_path: Path) -> None:
     first = run.read_bytes()
     refused = invoke(*words, "--seed", "1")
     assert refused.exit_code == 2
-    assert f"{run} exists already" in refused.stderr
+    assert f"{run} contains a log already" in refused.stderr
+    assert "--replace" in refused.stderr
     assert run.read_bytes() == first
     assert invoke(*words, "--seed", "1", "--replace").exit_code == 0
     assert run.read_bytes() != first
