@@ -104,7 +104,11 @@ def arrow_of(table: Any) -> pa.Table:
         units = table.attrs.get("units", {})
         metadata = {str(k): str(v) for k, v in table.attrs.get("metadata", {}).items()}
         named = [name for name in table.index.names if name is not None]
-        found = pa.Table.from_pandas(table.reset_index(named), preserve_index=False)
+        try:
+            found = pa.Table.from_pandas(table.reset_index(named), preserve_index=False)
+        except (pa.ArrowException, ValueError, TypeError, NotImplementedError) as error:
+            reason = "; ".join(map(str, reversed(error.args)))
+            raise UsageError(f"the table is not one of numbers: {reason}") from None
         fields = [
             f.with_metadata({"unit": units[f.name]}) if f.name in units else f for f in found.schema
         ]

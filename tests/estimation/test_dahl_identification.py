@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -197,3 +198,25 @@ def test_a_simulated_bench_gives_back_what_it_hides() -> None:
     assert group.stiffness == pytest.approx(500.0, abs=4 * group.std[1])
     assert group.std[0] < 5e-4
     assert found.residual_std == pytest.approx(0.8, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("records", "wraps", "told"),
+    [
+        ([], PROFILE, "wraps is a WinchProfile; pass a list of lists of wrap angles"),
+        (None, [[1.0]], "records is None; pass a list of PulleyRecord"),
+        ("runs.csv", [[1.0]], "records is a str"),
+        ([None], [[1.0]], r"records\[0\] is None; pass a PulleyRecord: record_of"),
+        ([], [["a"]], r"wraps\[0\].* is no array of real numbers"),
+        ([], [], "0 samples and 0 pulley groups cannot be identified"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_sentence(records: Any, wraps: Any, told: str) -> None:
+    with pytest.raises(UsageError, match=told):
+        identify_dahl(records, wraps)
+
+
+@pytest.mark.parametrize("run", [None, "a.csv", []])
+def test_a_record_is_of_a_run(run: Any) -> None:
+    with pytest.raises(UsageError, match=r"run is .*; pass a Run"):
+        record_of(run, PROFILE)

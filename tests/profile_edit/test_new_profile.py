@@ -61,6 +61,18 @@ def test_every_example_is_read_and_what_is_needed_is_required(kind: str, tmp_pat
         ({"drum.winding_radius": "60"}, "drum.winding_radius: '60' has no unit"),
         ({"drum.winding_radius": "60,5 mm"}, "write the decimal point: 60.5 mm"),
         ({"drum.winding_radius": "-60 mm"}, "must be above 0 m"),
+        ({"reference.cable_length": "-1 m"}, "reference.cable_length: '-1 m' must be at least 0 m"),
+        (
+            {"path.inclination": "1e6 deg"},
+            "path.inclination: '1e6 deg' must be at most 3.14159 rad",
+        ),
+        ({"motor.inertia": "1e300 kg m^2"}, "motor.inertia: '1e300 kg m^2' must be at most 1e+09"),
+        ({"motor.torque_constant": "nan N m/A"}, "motor.torque_constant: 'nan N m/A'"),
+        ({"cable.mass_per_length": "1e9 g/m"}, "cable.mass_per_length: '1e9 g/m' must be at most"),
+        (
+            {"guide.screw_lead": "5 mm", "guide.belt_ratio": "1e9"},
+            "guide.belt_ratio: '1e9' must be at most 1000",
+        ),
         ({"drum.kind": "spirl"}, "did you mean 'spiral'?"),
         ({"drum.groove_pitch": "5 mm"}, "drum.groove_pitch: a spiral drum has none"),
         ({"guide.distance": "1 m"}, "guide.distance: give guide.screw_lead too"),

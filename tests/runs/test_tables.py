@@ -123,3 +123,72 @@ def test_an_absent_package_is_named_with_the_line_that_installs_it(
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(UsageError, match=rf"pip install 'winchkit\[{extra}\]'"):
         call(RUN)
+
+
+FRAME = {"time": [0.0, 0.1, 0.2, 0.3], "motor_angle": [0.0, 1.0, 2.0, 3.0]}
+UNITS = {"time": "s", "motor_angle": "rad"}
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [True, False, True, True],
+        ["0", "1", "2", "3"],
+        np.array([1, "x", 2, 3], dtype=object),
+        pd.date_range("2026-01-01", periods=4),
+        np.array([0, 1j, 2, 3]),
+        [[0.0], [1.0], [2.0], [3.0]],
+    ],
+)
+def test_a_channel_without_numbers_is_refused_in_one_sentence(values: Any) -> None:
+    with pytest.raises(UsageError, match="motor_angle"):
+        run_of(pd.DataFrame({**FRAME, "motor_angle": values}), units=UNITS)
+
+
+def test_other_kinds_of_numbers_are_converted() -> None:
+    """Missing values, decimals, categories, whole numbers beyond 2^53, and a flag."""
+    from decimal import Decimal
+
+    big = 2**60 + 1
+    for values, second in (
+        (pd.array([0, None, 2, 3], dtype="Int64"), np.nan),
+        ([Decimal("0"), Decimal("1.5"), Decimal("2"), Decimal("3")], 1.5),
+        (pd.Categorical([0.0, 1.0, 2.0, 3.0]), 1.0),
+        (np.ma.masked_array([0.0, 1.0, 2.0, 3.0], [False, True, False, False]), np.nan),
+        (np.array([0, big, 2, 3], dtype=np.int64), float(big)),
+    ):
+        run = run_of(
+            pd.DataFrame({**FRAME, "motor_angle": values, "brake": [True] * 4}), units=UNITS
+        )
+        np.testing.assert_equal(run["motor_angle"][1], second)
+        np.testing.assert_array_equal(run["brake"], 1.0)
+
+
+def test_moments_are_seconds_after_the_first() -> None:
+    moments = pd.date_range("2026-03-01 10:00", periods=4, freq="100ms")
+    run = run_of(pd.DataFrame({**FRAME, "time": moments}), units={"motor_angle": "rad"})
+    np.testing.assert_allclose(run.time, [0.0, 0.1, 0.2, 0.3])
+    assert run.metadata["start_time"].startswith("2026-03-01T10:00:00")
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        (["a"] * 3, "no array of real numbers"),
+        (np.zeros((3, 2)), "no array of real numbers"),
+        (np.array([0, 1j, 2]), "no array of real numbers"),
+        (None, "no array of real numbers"),
+        (np.zeros(2), "has 2 values for 3 times"),
+    ],
+)
+def test_a_channel_of_a_run_made_by_hand_is_an_array_of_numbers(values: Any, told: str) -> None:
+    with pytest.raises(UsageError, match=told):
+        Run("x", np.arange(3.0), {"motor_angle": Channel(values, "rad")})
+
+
+def test_lists_and_masked_arrays_of_a_run_made_by_hand_are_converted() -> None:
+    masked = np.ma.masked_array([1, 2, 3], [False, True, False])
+    run = Run("x", [0, 1, 2], {"a": Channel([True, False, None], "1"), "b": Channel(masked, "N")})  # type: ignore[arg-type]
+    np.testing.assert_array_equal(run["a"], [1.0, 0.0, np.nan])
+    np.testing.assert_array_equal(run["b"], [1.0, np.nan, 3.0])
+    assert run.time.dtype == np.float64

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from winchkit.arguments import require_types
+from winchkit.arguments import real_numbers, require_type, require_types
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation.groups import PulleyGroup, flat_pulleys
@@ -117,6 +117,8 @@ def record_of(run: Run, profile: WinchProfile) -> PulleyRecord:
 
     Raises RunError without ``tension``, and without ``load`` and ``load_mass``.
     """
+    require_type(run, Run, "run")
+    require_type(profile, WinchProfile, "profile")
     load = run["load"] if "load" in run.channels else None
     if load is None and run.load_mass is None:
         raise RunError(
@@ -170,8 +172,13 @@ def identify_dahl(
     from scipy.optimize import least_squares
 
     require_types(records, PulleyRecord, "records")
+    if isinstance(wraps, str) or not isinstance(wraps, Sequence | np.ndarray):
+        kind = type(wraps).__name__
+        raise UsageError(f"wraps is a {kind}; pass a list of lists of wrap angles, one per group")
+    for index, group in enumerate(wraps):
+        real_numbers(f"wraps[{index}]", group)
     samples = sum(len(record.cell) for record in records)
-    if samples < _LEAST_SAMPLES or not wraps:
+    if samples < _LEAST_SAMPLES or not len(wraps):
         raise UsageError(
             f"{samples} samples and {len(wraps)} pulley groups cannot be identified; give at "
             f"least {_LEAST_SAMPLES} samples and one group"

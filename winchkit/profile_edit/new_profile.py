@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from winchkit.arguments import path_of
+from winchkit.arguments import path_of, require_mapping, require_types
 from winchkit.errors import UsageError, suggest
 from winchkit.profile_edit.drawing import (
     DRUMS,
@@ -99,6 +99,8 @@ def new_profile(
         quantity, a needed one that is missing, or values that contradict each other.
     """
     file = path_of(path, "path")
+    require_mapping(values, "values", "texts by key")
+    require_types(pulleys, str, "pulleys")
     refuse_existing(file, replace)
     given = {key: str(text).strip() for key, text in values.items() if str(text).strip()}
     fields = asked(given)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arguments import is_real, real_numbers
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError, suggest
+from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.rendering import Plotted
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse
@@ -46,6 +47,11 @@ class Channel:
     column: int | None = None
     """Column in the file, counted from 1."""
 
+    def __post_init__(self) -> None:
+        """Numbers of another kind are converted; raises UsageError for what is none."""
+        if not is_real(self.values):
+            object.__setattr__(self, "values", real_numbers("the values of a channel", self.values))
+
     @property
     def missing(self) -> int:
         """Number of NaN samples."""
@@ -68,6 +74,16 @@ class Run(Plotted, Tabular):
     """File; empty where it was not read from one."""
     notes: tuple[str, ...] = ()
     """Notes of the reader, e.g. on a column that was left out."""
+
+    def __post_init__(self) -> None:
+        """Times of another kind are converted; raises UsageError for channels of other lengths."""
+        if not is_real(self.time):
+            object.__setattr__(self, "time", real_numbers("time", self.time))
+        for name, channel in self.channels.items():
+            if len(channel.values) != len(self.time):
+                raise UsageError(
+                    f"channel '{name}' has {len(channel.values)} values for {len(self.time)} times"
+                )
 
     def __len__(self) -> int:
         return len(self.time)

@@ -11,7 +11,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError, suggest
 from winchkit.runs.assemble import RawColumns, assemble
-from winchkit.runs.columns import header_of
+from winchkit.runs.columns import column_dimension, header_of
 from winchkit.runs.run import Run
 from winchkit.tabular import arrow_of
 
@@ -52,8 +52,11 @@ def run_of(
         With every fault, as :func:`winchkit.read_run`: a missing column, an unknown unit, times
         that are out of order.
     UsageError
-        For an object that is no table, a unit for a column that is not there, or without pyarrow.
+        For an object that is no table, a unit for a column that is not there, a channel that has no
+        numbers, or without pyarrow.
     """
+    import pyarrow as pa
+
     found = arrow_of(table)
     given = dict(units or {})
     header = []
@@ -72,7 +75,14 @@ def run_of(
     texts = {key: value for key, value in texts.items() if key not in _OF_PROGRAMS}
     named = name or texts.pop(_NAME, "") or "table"
     texts.pop(_NAME, None)
-    columns = [_numbers(column) for column in found.columns]
+    named_columns = zip(header, found.columns, strict=True)
+    columns = [_numbers(own, column) for (own, _), column in named_columns]
+    for index, (own, _) in enumerate(header):
+        kind = found.schema.field(index).type
+        if own == "time" and (pa.types.is_timestamp(kind) or pa.types.is_duration(kind)):
+            header[index] = own, "s"
+            if pa.types.is_timestamp(kind) and (start := _first_moment(found.columns[index])):
+                texts.setdefault("start_time", start)
     recording = RawColumns(named, header, columns, metadata={**texts, **dict(metadata or {})})
     return replace(assemble(recording), name=named, path="")
 
@@ -81,16 +91,43 @@ _OF_PROGRAMS = frozenset({"pandas", "ARROW:schema"})
 """Metadata that other programs write for themselves."""
 
 
-def _numbers(column: Any) -> Array | None:
-    """Values of a column, NaN where it is null; None for a column with text."""
+def _numbers(name: str, column: Any) -> Array | None:
+    """Values of a column, NaN where it is null; None for a column with text that is no channel.
+
+    Moments are in seconds after the first. Raises UsageError for a channel without numbers.
+    """
     import pyarrow as pa
 
+    if pa.types.is_dictionary(column.type):
+        column = column.cast(column.type.value_type)
     kind = column.type
-    if pa.types.is_duration(kind):
-        return np.asarray(column.to_numpy() / np.timedelta64(1, "s"), dtype=np.float64)
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
-        return None
-    return np.array(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+    if pa.types.is_duration(kind) or (pa.types.is_timestamp(kind) and name == "time"):
+        moments = column.to_numpy()
+        known = moments[~np.isnat(moments)]
+        origin = known[0] if pa.types.is_timestamp(kind) and len(known) else moments.dtype.type(0)
+        return np.asarray((moments - origin) / np.timedelta64(1, "s"), dtype=np.float64)
+    is_channel = name == "time" or column_dimension(name) is not None
+    is_number = (
+        pa.types.is_integer(kind)
+        or pa.types.is_floating(kind)
+        or pa.types.is_decimal(kind)
+        or (pa.types.is_boolean(kind) and not is_channel)
+    )
+    if is_number:
+        # Integers beyond 2^53 are rounded, to 16 digits.
+        return np.array(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+    if is_channel:
+        raise UsageError(
+            f"column '{name}' is of {kind} and has no numbers; convert it, or leave it out"
+        )
+    return None
+
+
+def _first_moment(column: Any) -> str:
+    """First moment of a column, ISO 8601 in UTC; empty without one."""
+    moments = column.to_numpy()
+    known = moments[~np.isnat(moments)]
+    return f"{known[0].astype('datetime64[us]')}+00:00" if len(known) else ""
 
 
 def _text(value: bytes) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import ceil
 from typing import TYPE_CHECKING
 
-from winchkit.arguments import require_type
+from winchkit.arguments import require_mapping, require_type
 from winchkit.errors import UsageError
 from winchkit.schema.bench import WinchWiring
 from winchkit.schema.profiles.winch import WinchProfile
@@ -75,6 +75,7 @@ def simulate(
         For a programme that does not match the bench.
     """
     require_type(bench, SimBench, "bench")
+    require_mapping(profiles, "profiles", "profiles by winch")
     require_type(programme, Programme, "programme")
     if bench.platform is not None:
         raise UsageError(

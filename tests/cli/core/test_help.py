@@ -101,7 +101,7 @@ def test_a_letter_that_a_command_lacks_is_explained() -> None:
 
 def test_quiet_leaves_out_everything_but_results(folder: Path) -> None:
     (folder / "m.toml").write_text(MOTION)
-    words = ("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz")
+    words = ("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz", "--replace")
     told, quiet = invoke(*words), invoke(*words, "-q")
     assert told.stdout == quiet.stdout
     assert told.stderr == f"next: winchkit compare {told.stdout.strip()} -p bench-spiral\n"
@@ -114,7 +114,7 @@ def test_quiet_leaves_out_everything_but_results(folder: Path) -> None:
 def test_verbose_reports_what_was_read_and_how_long(folder: Path) -> None:
     (folder / "m.toml").write_text(MOTION)
     environment = {"WINCHKIT_SIM_RECORD_RATE": "10 Hz"}
-    words = ("sim", "record", "spiral-bench", "m.toml", "-v")
+    words = ("sim", "record", "spiral-bench", "m.toml", "--replace", "-v")
     lines = CliRunner().invoke(main, words, env=environment).stderr.splitlines()
     reported = [line.partition(" s] ")[2] for line in lines if line.startswith("[")]
     assert reported[0] == "--rate 10 Hz by WINCHKIT_SIM_RECORD_RATE"
@@ -127,7 +127,7 @@ def test_verbose_reports_what_was_read_and_how_long(folder: Path) -> None:
 
 def test_no_suggestion_beside_json(folder: Path) -> None:
     (folder / "m.toml").write_text(MOTION)
-    words = ("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz", "--json")
+    words = ("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz", "--replace", "--json")
     assert invoke(*words).stderr == ""
 
 

@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import FileError, open_writer, write_run
 from winchkit.catalog import find
+from winchkit.cli import main
 from winchkit.errors import ConnectionLost
 from winchkit.fleet import diagnose_library, index_library
 from winchkit.fleet.library import cluster, diagnose
@@ -108,6 +110,21 @@ def test_an_interruption_keeps_what_is_done_and_the_next_call_goes_on(
     assert (report.diagnosed, report.unchanged) == (1, 2)
     assert len(seen) == 4
     assert rows(library, "estimates") == rows(library, "diagnoses")
+
+
+def test_the_list_of_a_library_has_the_verdict_of_every_run(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def listed() -> list[str]:
+        result = CliRunner().invoke(main, ["library", "list", str(library)])
+        assert result.exit_code == 0, result.output
+        return result.stdout.splitlines()
+
+    assert not any("explained" in line for line in listed())
+    monkeypatch.setattr(diagnose, "outcome_of", outcome)
+    diagnose_library(library, "bench-spiral", jobs=1)
+    assert len(listed()) == 3
+    assert all("explained" in line for line in listed())
 
 
 def test_a_fleet_of_axes_is_diagnosed_and_its_history_fitted(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.streams import streams_of
-from winchkit.runs.importing.unit_spelling import split_unit
+from winchkit.runs.importing.units.spelling import split_unit
 
 COUNT, STEP = 200, 0.01
 TIME = np.arange(COUNT) * STEP

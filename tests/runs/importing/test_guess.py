@@ -18,7 +18,7 @@ from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.names import meaning_of, words_of
-from winchkit.runs.importing.unit_spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import read_unit, split_unit
 from winchkit.schema.mapping import CHANNEL_DIMENSIONS, CHANNELS, DATE, MATRIX, POSE_DIMENSIONS
 from winchkit.units import UNITS
 

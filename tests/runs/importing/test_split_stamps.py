@@ -16,7 +16,7 @@ from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
-from winchkit.runs.importing.unit_spelling import split_unit
+from winchkit.runs.importing.units.spelling import split_unit
 
 START = 1_700_000_000
 RESOLUTION = 2.4e-7

@@ -18,7 +18,8 @@ from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, suggest
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
-from winchkit.runs.importing.unit_spelling import BRIDGE, COUNTS, read_unit
+from winchkit.runs.importing.units.known import BRIDGE, COUNTS
+from winchkit.runs.importing.units.spelling import read_unit
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
 from winchkit.units import GRAVITY, format_quantity
 

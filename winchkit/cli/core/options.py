@@ -209,6 +209,9 @@ runs_folder_option = output_option(
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
 )
+replace_option: Decorator = click.option(
+    "--replace", is_flag=True, help="Write over files of that name."
+)
 format_option: Decorator = click.option(
     "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
 )

@@ -19,6 +19,7 @@ from winchkit.cli.core.options import (
     bus_options,
     dry_run_option,
     output_option,
+    replace_option,
     yes_option,
 )
 from winchkit.cli.core.output import is_json, json_flag, tell
@@ -68,13 +69,16 @@ def command() -> None:
 @_who
 @bus_options
 @output_option("A .dcf or .json file.", required=True, type=_FILE, callback=None)
+@replace_option
 @_json
-def save(who: str, *, output: Path, **bus: Any) -> None:
+def save(who: str, *, output: Path, replace: bool, **bus: Any) -> None:
     """Read every setting of a drive into a file."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import read_config, write_config_file
+    from winchkit.runs.files import refuse_existing
 
     check_output(output, _FORMATS)
+    refuse_existing(output, replace)
     choice = BusChoice(**bus)
     with drive_at(choice.spec(), who) as node:
         config = read_config(node.objects)

@@ -10,7 +10,13 @@ import click
 
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import PROFILE, effects_option, output_option, quantity_option
+from winchkit.cli.core.options import (
+    PROFILE,
+    effects_option,
+    output_option,
+    quantity_option,
+    replace_option,
+)
 
 
 @click.command(
@@ -32,6 +38,7 @@ from winchkit.cli.core.options import PROFILE, effects_option, output_option, qu
 @quantity_option("--load-mass", of="mass", example="10 kg", help="Mass on the cable, for MuJoCo.")
 @effects_option
 @output_option("File to write; by default standard output.")
+@replace_option
 def command(
     *,
     profile: str,
@@ -39,6 +46,7 @@ def command(
     load_mass: str | None,
     effects: Sequence[str],
     output: str | None,
+    replace: bool,
 ) -> None:
     """Write PROFILE for other programs, with its effects as they stand in it.
 
@@ -52,8 +60,11 @@ def command(
     from winchkit.dynamics.export import export_model
     from winchkit.effects import load_catalogue
     from winchkit.errors import Fault, FileError
+    from winchkit.runs.files import refuse_existing
     from winchkit.schema.read import read_profile
 
+    if output is not None:
+        refuse_existing(Path(output), replace)
     mass = None if load_mass is None else quantity(load_mass, "mass")
     declared = read_profile(find("profiles", profile))
     exported = export_model(declared, form, load_catalogue(effects), mass)

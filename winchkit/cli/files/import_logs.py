@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,7 @@ class _Written(QuantityType):
     multiple=True,
     metavar="CHANNEL=COLUMN",
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
-    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, 'tau_a-tau_b' of several columns, "
+    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, '(tau_a-tau_b)/2' of several columns, "
     "'FILE:tension=2 [N]' of one file; nothing after = for none. May be given several times.",
 )
 @click.option(
@@ -211,12 +212,16 @@ def command(
         if is_json():
             echo_json(report)
         return
+    target = Path(save_mapping or Path(output) / _MAPPING) if is_new or save_mapping else None
     is_open = any(guess.questions for guess in guesses)
     if is_open or (is_new and not _is_accepted(guesses, yes)):
         if is_json():
             echo_json(report)
         raise UsageError(_unanswered(guesses))
     mapping_file = declared or mapping_from(guesses)
+    is_saved = target is not None and _is_saved(mapping_file, target)
+    if target is not None and not is_saved and not overwrite:
+        _refuse_to_replace(target)
     targets = targets_in(files, Path(output), overwrite=overwrite, is_joined=join)
     with progress_bar() as progress:
         progress("converting", None)
@@ -230,8 +235,8 @@ def command(
         note(f"{joint.path}: {joint.text}")
     _tell((item["run"], f"{item['channel']}: {item['text']}") for item in report["sanity"])
     report["runs"] = write_runs(results, targets, Path(output))
-    if is_new or save_mapping:
-        report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
+    if target is not None:
+        report["mapping"] = str(target) if is_saved else _saved(mapping_file, target)
     if is_json():
         echo_json(report)
     suggest_next("check", [str(entry["path"]) for entry in report["runs"]])
@@ -319,9 +324,30 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
     return "\n".join([accept, *lines])
 
 
-def _saved(mapping: ImportMapping, path: str) -> str:
+def _is_saved(mapping: ImportMapping, path: Path) -> bool:
+    """Whether a file has all logs of a mapping, under any names."""
+    from winchkit.schema.read import read_mapping
+
+    try:
+        there = read_mapping(path).log if path.is_file() else ()
+    except (FileError, UsageError):
+        return False
+    known = [replace(log, name="") for log in there]
+    return bool(there) and all(replace(log, name="") in known for log in mapping.log)
+
+
+def _refuse_to_replace(path: Path) -> None:
+    """Raise UsageError for a mapping of other columns, or another file, that is there."""
+    if path.exists():
+        raise UsageError(
+            f"{path} exists already, with other columns or units; name another file by "
+            "--save-mapping, or write over it by --replace"
+        )
+
+
+def _saved(mapping: ImportMapping, path: Path) -> str:
     from winchkit.runs.importing.mapping import write_mapping
 
-    write_mapping(mapping, Path(path))
+    write_mapping(mapping, path)
     note(f"mapping: {path}")
-    return path
+    return str(path)

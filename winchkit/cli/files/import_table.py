@@ -21,6 +21,8 @@ _FIRST = 3
 """Values of a column that are shown: enough to see its unit and first step."""
 _MOST = 4
 """Different texts of one kind from which those that differ in numbers alone are one line."""
+_UNUSED = 8
+"""Columns without a channel that have a line each; of more, those of one reason have one."""
 _NUMBER = re.compile(r"\d[\d.e+-]*")
 _HEAD = ("column", "channel", "unit", "SI of 1", "confidence", "first values", "plot", "reason")
 
@@ -78,8 +80,11 @@ def tables_text(group: Sequence[Guess]) -> str:
     title = f"{names}: {table.layout}; {len(table.columns)} columns, {rows} rows"
     columns = {column.source: column for column in table.columns}
     ordered = sorted(guess.assignments, key=lambda item: not item.channel)
-    lines = [_HEAD, *(_row(item, columns[item.source]) for item in ordered)]
+    unused = [item for item in ordered if not item.channel]
+    listed = [item for item in ordered if item.channel or len(unused) <= _UNUSED]
+    lines = [_HEAD, *(_row(item, columns[item.source]) for item in listed)]
     body = aligned(lines, words=len(_HEAD))
+    body += _not_used(unused) if len(unused) > _UNUSED else []
     constants = ", ".join(f"{one_line(k)} = {v:g}" for k, v in table.constants.items())
     notes = [f"  constants: {constants}"] if constants else []
     told = [(one.table.path, note) for one in group for note in (*one.table.notes, *one.notes)]
@@ -91,6 +96,14 @@ def tables_text(group: Sequence[Guess]) -> str:
     for mark, pairs in (("note:", told), ("?", asked)):
         notes += [f"  {mark} {line.removeprefix(f'{names}: ')}" for line in together(pairs)]
     return "\n".join([title, *body, *notes])
+
+
+def _not_used(items: Sequence[Assignment]) -> list[str]:
+    """A line for each reason, with the columns that it leaves out."""
+    by_reason: dict[str, list[str]] = {}
+    for item in items:
+        by_reason.setdefault(item.reason, []).append(one_line(item.source))
+    return [f"  not used, {why}: {', '.join(names)}" for why, names in by_reason.items()]
 
 
 def _row(item: Assignment, column: FileColumn) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import click
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import files_of_kind
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import BENCH, output_option
+from winchkit.cli.core.options import BENCH, output_option, replace_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -48,6 +48,7 @@ _FEW = 2
 @output_option(
     "Programme (.toml) to write, the first of the list; of a robot poses (.csv).", "NEXT"
 )
+@replace_option
 @click.option(
     "-b",
     "--bench",
@@ -57,7 +58,9 @@ _FEW = 2
 )
 @model_options
 @json_flag("Print the answer as JSON.")
-def command(runs: Sequence[str], output: str | None, bench: str | None, asked: Asked) -> None:
+def command(
+    runs: Sequence[str], output: str | None, replace: bool, bench: str | None, asked: Asked
+) -> None:
     """Propose motion programmes, ranked by the effects that they distinguish and show per minute.
 
     Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
@@ -67,12 +70,15 @@ def command(runs: Sequence[str], output: str | None, bench: str | None, asked: A
     """
     from winchkit import wings
     from winchkit.diagnosis.profiles import require_winch
+    from winchkit.runs.files import refuse_existing
 
     declared = declared_profile(asked.source)
+    if output is not None:
+        refuse_existing(Path(output), replace)
     if (by_wing := wings.call("plan_command", declared)) is not None:
         by_wing(runs, declared, asked, output, bench)
     else:
-        _plan_winch(runs, require_winch(declared), asked, output, bench)
+        _plan_winch(runs, require_winch(declared), asked, output, bench, replace=replace)
 
 
 def _plan_winch(
@@ -81,10 +87,13 @@ def _plan_winch(
     asked: Asked,
     output: str | None,
     bench: str | None,
+    *,
+    replace: bool,
 ) -> None:
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.runs.files import refuse_existing
     from winchkit.schema.profiles.axis import AxisProfile
     from winchkit.schema.programme import write_programme
 
@@ -94,6 +103,8 @@ def _plan_winch(
             "'winchkit diagnose' lists the next runs"
         )
     path = None if output is None else _programme_file(output)
+    if path is not None:
+        refuse_existing(path, replace)
     limits = None if bench is None else _limits(bench, asked.winch)
     with progress_bar() as progress:
         answer = diagnose(

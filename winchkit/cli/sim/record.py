@@ -16,6 +16,7 @@ from winchkit.cli.core.options import (
     SIM_BENCH,
     format_option,
     quantity_option,
+    replace_option,
     runs_folder_option,
 )
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -56,6 +57,7 @@ _RATE = 50.0
 )
 @runs_folder_option
 @format_option
+@replace_option
 @click.option(
     "--hidden",
     multiple=True,
@@ -73,6 +75,7 @@ def command(
     rate: str | None,
     output: Path,
     suffix: str,
+    replace: bool,
     hidden: tuple[str, ...],
 ) -> None:
     """Run PROGRAMMEs on a simulated BENCH without buses; write one run per load and repeat.
@@ -112,12 +115,14 @@ def command(
                 def tell(what: str, share: float | None = done) -> None:
                     progress(what, share)
 
-                found = of_wing(value, declared, output, f".{suffix}", seed=seed, tell=tell)
+                found = of_wing(
+                    value, declared, output, f".{suffix}", seed=seed, tell=tell, replace=replace
+                )
                 runs = ((file, read_run(file)) for file in found)
             else:
                 value = read_programme(path)
                 made = simulate(declared, profiles, value, seed=seed, rate=hertz)
-                runs = _written(made, output, suffix)
+                runs = _written(made, output, suffix, replace=replace)
             for file, run in runs:
                 written.append(_entry(file, run, value.name))
                 progress(f"{value.name}: {file.name} written", done)
@@ -131,14 +136,16 @@ def command(
     suggest_next("compare", sorted(str(entry["path"]) for entry in written), *words)
 
 
-def _written(runs: Iterable[Run], folder: Path, suffix: str) -> Iterator[tuple[Path, Run]]:
-    """Write runs as they are simulated."""
+def _written(
+    runs: Iterable[Run], folder: Path, suffix: str, *, replace: bool
+) -> Iterator[tuple[Path, Run]]:
+    """Write runs as they are simulated; raises UsageError for one that exists."""
     from winchkit.runs import write_run
 
     for run in runs:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{run.name}.{suffix}"
-        write_run(run, path, replace=True)
+        write_run(run, path, replace=replace)
         yield path, run
 
 

@@ -47,7 +47,7 @@ def command(
 ) -> None:
     """List the runs of an indexed folder, in the order of winch and time."""
     from winchkit.cli.core.quantities import quantity
-    from winchkit.fleet.library.query import library_runs
+    from winchkit.fleet.library.query import library_runs, verdicts_of
 
     rows = library_runs(
         folder,
@@ -58,6 +58,8 @@ def command(
         until=_day("--until", until),
         verdict=verdict,
     ).to_pylist()
+    judged = verdicts_of(folder)
+    rows = [{**row, "verdict": " and ".join(judged.get(row["path"], ())) or None} for row in rows]
     tell({"runs": rows}, _lines(rows))
 
 
@@ -65,7 +67,13 @@ def _lines(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     width = max((len(row["winch"]) for row in rows), default=0)
     for row in rows:
         mass = "" if row["load_mass"] is None else f"{row['load_mass']:g} kg"
-        facts = (row["programme"], mass, row["fault"], "" if row["complete"] else "no end")
+        facts = (
+            row["programme"],
+            mass,
+            row["verdict"] or "",
+            row["fault"],
+            "" if row["complete"] else "no end",
+        )
         known = "  ".join(fact for fact in facts if fact)
         moment: datetime = row["time"]
         yield f"{row['winch']:<{width}}  {moment:%Y-%m-%d %H:%M}  {row['path']}  {known}"

@@ -57,8 +57,7 @@ def library_runs(
     found = tables.read("runs")
     judged: set[str] = set()
     if verdict is not None:
-        rows = tables.read("diagnoses", ("runs", "verdict")).to_pylist()
-        judged = {path for row in rows if row["verdict"] == verdict for path in row["runs"]}
+        judged = {path for path, own in verdicts_of(folder).items() if verdict in own}
 
     def fits(row: dict[str, Any]) -> bool:
         moment: datetime = row["time"]
@@ -74,6 +73,15 @@ def library_runs(
     kept = [row for row in found.to_pylist() if fits(row)]
     kept.sort(key=lambda row: (row["winch"], row["time"], row["path"]))
     return type(found).from_pylist(kept, schema=arrow_schema("runs"))
+
+
+def verdicts_of(folder: str | Path) -> dict[str, tuple[str, ...]]:
+    """Verdicts of the sessions that a run is of, by its path; runs of none are left out."""
+    found: dict[str, tuple[str, ...]] = {}
+    for row in indexed(folder).read("diagnoses", ("runs", "verdict")).to_pylist():
+        for path in row["runs"] if row["verdict"] else ():
+            found[path] = tuple(dict.fromkeys((*found.get(path, ()), row["verdict"])))
+    return found
 
 
 def library_estimates(folder: str | Path) -> pa.Table:

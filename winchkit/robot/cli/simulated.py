@@ -42,10 +42,12 @@ def record_robot(
     *,
     seed: int,
     tell: Callable[[str], None],
+    replace: bool = False,
 ) -> list[Path]:
     """Run a robot programme on a simulated bench; returns its logs, one per repeat.
 
-    Raises UsageError for a bench without a robot.
+    Raises UsageError for a bench without a robot, and for logs that exist and are not to be
+    replaced.
     """
     from winchkit.errors import UsageError
     from winchkit.robot.bench.programme import run_robot_programme
@@ -61,5 +63,5 @@ def record_robot(
 
     with simulated_robot(sim, seed) as opened:
         return run_robot_programme(
-            opened, programme, folder, suffix=suffix, progress=progress, replace_files=True
+            opened, programme, folder, suffix=suffix, progress=progress, replace_files=replace
         )

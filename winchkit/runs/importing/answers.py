@@ -14,7 +14,8 @@ from winchkit.errors import UsageError, suggest
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.table import ColumnTable
-from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
+from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE
+from winchkit.runs.importing.units.spelling import read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.schema.plausible import typed_quantity
 from winchkit.units import UNITS

@@ -13,7 +13,7 @@ from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, clock_before
-from winchkit.runs.importing.unit_spelling import COUNTS, SpelledUnit
+from winchkit.runs.importing.units.known import COUNTS, SpelledUnit
 from winchkit.schema.linear_axis import rotary_name
 
 _MEASURED = {"actual", "act", "ist", "measured", "meas"}

@@ -25,15 +25,15 @@ from winchkit.runs.importing.orientation import (
 )
 from winchkit.runs.importing.source_stamps import SOURCE_STAMP
 from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
-from winchkit.runs.importing.unit_spelling import (
+from winchkit.runs.importing.units.known import (
     BRIDGE,
     COUNT_RATE,
     COUNTS,
     SHARE,
     SpelledUnit,
-    named_unit,
-    read_unit,
+    is_of_two_quantities,
 )
+from winchkit.runs.importing.units.spelling import named_unit, read_unit, unit_as_name
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.linear_axis import CHANNELS, ROTARY
 from winchkit.schema.mapping import ANGLES, DATE, MATRIX, POSE_DIMENSIONS, QUATERNION
@@ -102,6 +102,7 @@ def choose(
             if found.channel in _SCALAR and column.name in vectors:
                 found = replace(found, rank=_BY_RANK, reason=f"{found.reason}, one of x, y, z")
             (free if found.channel else choice.unused).append(found)
+            choice.notes += _unread(column)
     taken = {item.channel for item in choice.chosen}
     free = _left_after(taken, free, choice)
     free = _left_after(without, free, choice, "has no column, by --column")
@@ -197,6 +198,8 @@ def _candidate(
         return ChannelCandidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
     if linear and meaning is not None:
         meaning = replace(meaning, channel=_LINEAR.get(meaning.channel, meaning.channel))
+    if meaning is None and not column.unit:
+        unit = unit_as_name(column.name)
     found = _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
     return replace(found, channel=_LINEAR.get(found.channel, found.channel)) if linear else found
 
@@ -220,6 +223,8 @@ def _by_name(
         return _by_unit(column, unit)
     if fits:
         return ChannelCandidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
+    if is_of_two_quantities(column.unit):
+        return ChannelCandidate(column, channel, meaning.rank, None, f"'{meaning.text}'")
     found = _by_unit(column, unit)
     return replace(found, rank=_BY_RANK) if found.channel else found
 
@@ -234,11 +239,28 @@ def _by_unit(column: FileColumn, unit: SpelledUnit | None) -> ChannelCandidate:
     """Channel of a dimension; the time of a first column without a name that increases."""
     channel = "" if unit is None else _BY_DIMENSION.get(unit.dimension, "")
     if channel and (channel != "time" or _is_clock(column)):
-        return ChannelCandidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
+        return ChannelCandidate(
+            column, channel, _BY_UNIT, unit, f"unit {column.unit or column.name}"
+        )
     if column.number == 1 and column.name.isdecimal() and _is_clock(column, steady=True):
         return ChannelCandidate(column, "time", _BY_ORDER, None, "first column, increasing")
     known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"
     return ChannelCandidate(column, "", reason=known)
+
+
+def _unread(column: FileColumn) -> list[str]:
+    """Note on a column that is named like a channel and has text that seems to be numbers."""
+    meaning = None if column.texts is None else meaning_of(column.name, column.labels)
+    if column.texts is None or meaning is None or meaning.rank > 2:
+        return []
+    cells = [text for text in column.texts if text.strip()]
+    is_numeric = 2 * sum(any(map(str.isdigit, text)) for text in cells) > len(cells)
+    if meaning.channel in {IGNORED, CURRENT, "time", DATE} or not is_numeric:
+        return []
+    return [
+        f"'{column.source}' is named like {meaning.channel} and is left out: its cells are no "
+        f"numbers, e.g. '{cells[0]}'"
+    ]
 
 
 def _of_text(column: FileColumn) -> ChannelCandidate:

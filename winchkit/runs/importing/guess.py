@@ -21,7 +21,12 @@ from winchkit.runs.importing.assignment import (
 )
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
-from winchkit.runs.importing.formats.arithmetic import fault_of, is_expression, with_derived
+from winchkit.runs.importing.formats.arithmetic import (
+    fault_of,
+    is_expression,
+    scaled_column,
+    with_derived,
+)
 from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis, marker_column
 from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
@@ -29,7 +34,7 @@ from winchkit.runs.importing.source_stamps import delays, has_two_clocks, withou
 from winchkit.runs.importing.stored.settling import settle_stored
 from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
-from winchkit.runs.importing.unit_spelling import read_unit
+from winchkit.runs.importing.units.spelling import read_unit
 from winchkit.schema.mapping import CHANNELS, DATE
 from winchkit.units import UNITS
 
@@ -90,7 +95,8 @@ def guess_columns(table: ColumnTable, answers: Answers | None = None) -> Guess:
     return Guess(
         table,
         tuple({**unused, **assigned}[column.source] for column in table.columns),
-        tuple(dict.fromkeys(work.questions)),
+        # The time first: of a file without it nothing else can be judged.
+        tuple(sorted(dict.fromkeys(work.questions), key=lambda item: item.key != "sample_rate")),
         tuple(dict.fromkeys(work.notes)),
         rate,
     )
@@ -136,17 +142,40 @@ def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
         return item
     factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
     source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
+    scaled = scaled_column(table, source)
+    if scaled is not None:
+        name, size = scaled
+        factor = None if abs(size) == 1 else abs(size)
+        return replace(item, source=name, factor=factor, constant="", sign=math.copysign(1, size))
     return replace(item, source=source, factor=None, constant="", sign=1.0)
 
 
 def _wrong_unit(column: FileColumn | None, item: ColumnAnswer) -> Iterator[Question]:
-    """Question for a column whose unit in the file is none of the channel, and nothing else is."""
-    if column is None or item.unit or item.factor is not None or item.constant:
-        return
-    spelled = read_unit(column.unit)
-    if spelled is None or fits(item.channel, spelled.dimension):
+    """Question for a column whose unit in the file is none of the channel, and nothing else is.
+
+    Beside a factor, the unit of the file may be meant, or the unit that the factor leads to.
+    """
+    spelled = None if column is None or item.unit else read_unit(column.unit)
+    if column is None or spelled is None:
         return
     dimension = CHANNELS.get(item.channel) or "number"
+    if item.factor is not None or item.constant:
+        if spelled.dimension != dimension or (spelled.factor == 1 and not spelled.offset):
+            return
+        size = item.constant or f"{item.factor:.12g}"
+        si = next(iter(UNITS[dimension]))
+        text = f"column '{column.source}' is in {column.unit}: in which unit is it times {size}?"
+        sign = "-" * (item.sign < 0)
+        yield Question(
+            text,
+            tuple(
+                f'--column "{item.channel}={sign}{item.source}*{size} [{unit}]"'
+                for unit in (column.unit, si)
+            ),
+        )
+        return
+    if fits(item.channel, spelled.dimension):
+        return
     text = (
         f"column '{column.source}' is in {column.unit}, a unit of {spelled.dimension}, and "
         f"{item.channel} is a {dimension}"

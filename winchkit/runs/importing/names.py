@@ -168,7 +168,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (_JOINT, 3, "motor_angle"),
     (
         r"\b(motor ?angles?|mot(or)? ?(pos(ition)?|angle)|motorwinkel|motorposition|rotor\w*|"
-        r"theta|phi|encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",
+        r"theta|phi|enc|encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",
         1,
         "motor_angle",
     ),

@@ -16,7 +16,7 @@ from winchkit.runs.importing.assignment import (
 from winchkit.runs.importing.long_table import axes_of, has_kinds
 from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.unit_settling import is_alike
-from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE
+from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.schema.mapping import DATE
 from winchkit.units import UNITS
 

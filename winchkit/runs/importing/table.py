@@ -39,6 +39,8 @@ class FileColumn:
     """Position in the file, from 1."""
     source: str = ""
     """Name that is unique within the file."""
+    is_derived: bool = False
+    """Whether it is computed of other columns, whose names say nothing about its unit."""
 
     def __len__(self) -> int:
         return len(self.values)

@@ -22,14 +22,8 @@ from winchkit.runs.importing.consistency import CLOCKS
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import ColumnTable, are_whole
-from winchkit.runs.importing.unit_spelling import (
-    BRIDGE,
-    COUNT_RATE,
-    COUNTS,
-    SHARE,
-    SpelledUnit,
-    read_unit,
-)
+from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE, SpelledUnit
+from winchkit.runs.importing.units.spelling import read_unit
 from winchkit.runs.importing.winches import stem_of
 from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, POSITION, STAMP
 from winchkit.units import GRAVITY, UNITS
@@ -207,6 +201,8 @@ def by_convention(work: Work) -> None:
     """Units by convention: SI in files of arrays and for names of robotics, °C, seconds."""
     for item in work.columns:
         if item.factor is not None or item.candidate.unit is not None or item.column.unit:
+            continue
+        if item.column.is_derived:
             continue
         words = words_of(item.column.name)
         declared = _declared(work.table, column_dimension(item.base))

@@ -14,11 +14,9 @@ from winchkit.schema.quantity import (
     Angle,
     Count,
     Inertia,
-    Length,
     LinearDensity,
     PositiveForce,
     PositiveLength,
-    PositiveNumber,
     Quantity,
 )
 from winchkit.schema.table import Rule, Table
@@ -108,7 +106,9 @@ class CableSpec(Table):
 class PathSpec(Table):
     """Direction of the free cable."""
 
-    inclination: Angle = pi / 2
+    inclination: Annotated[
+        float, Quantity("angle", -pi, pi, why="it is an angle to the horizontal")
+    ] = pi / 2
     """Angle of the free cable to the horizontal, rad; 90 degrees is hanging."""
 
 
@@ -140,7 +140,9 @@ class GuideSpec(Table):
     """The lead-screw guide that lays the cable on the drum."""
 
     screw_lead: PositiveLength
-    belt_ratio: PositiveNumber = 1.0
+    belt_ratio: Annotated[
+        float, Quantity("ratio", 1e-3, 1e3, why="belts of cable guides have some tens at most")
+    ] = 1.0
     """Screw turns per drum turn."""
     distance: PositiveLength = 0.4
     """From drum to guide, m."""
@@ -160,7 +162,7 @@ class ReferenceSpec(Table):
     """Reference state of all angles and lengths."""
 
     motor_angle: Angle = 0.0
-    cable_length: Length | None = None
+    cable_length: Annotated[float, Quantity("length", 0.0)] | None = None
     """Free length at that motor angle, m; a robot's winches may leave it out."""
     wound_turns: Count = 0.0
     """Turns on the drum at that motor angle."""

@@ -16,7 +16,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.runs.importing.table import FileColumn
-from winchkit.runs.importing.unit_spelling import SpelledUnit, read_unit
+from winchkit.runs.importing.units.known import SpelledUnit
+from winchkit.runs.importing.units.spelling import read_unit
 
 _MISSING = {
     *("", "nan", "-nan", "+nan", "n/a", "na", "#n/a", "#nv", "#na", "null", "none", "-", "--"),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.names import meaning_of
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
-from winchkit.runs.importing.unit_spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import read_unit, split_unit
 
 _VALUE = re.compile(
     r"[_ ]*(value|val|reading|data|double|float|wert|valeur|valor|valore)s?[_ ]*", re.I

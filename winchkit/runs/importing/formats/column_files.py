@@ -12,7 +12,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import ColumnTable, readable, refuse_size
-from winchkit.runs.importing.unit_spelling import split_unit
+from winchkit.runs.importing.units.spelling import split_unit
 
 _OBJECTS = (
     "has Python objects, which may hold code; load it in Python where you trust it, and write its "

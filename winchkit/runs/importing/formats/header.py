@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.names import meaning_of
-from winchkit.runs.importing.unit_spelling import is_unit_row, read_unit, split_unit
+from winchkit.runs.importing.units.spelling import is_unit_row, read_unit, split_unit
 
 Row = tuple[int, list[str]]
 """Line number and cells."""

@@ -18,7 +18,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.fields import fields_of
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import ColumnTable
-from winchkit.runs.importing.unit_spelling import split_unit
+from winchkit.runs.importing.units.spelling import split_unit
 
 _DEEPEST = 6
 """Nesting of objects that is read; recordings have two or three levels."""

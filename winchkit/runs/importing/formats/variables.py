@@ -10,7 +10,7 @@ import numpy as np
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
-from winchkit.runs.importing.unit_spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import read_unit, split_unit
 
 _WIDEST = 200
 """Most columns of one matrix; a larger one is an image or a table of another kind."""

@@ -22,7 +22,7 @@ from winchkit.runs.importing.consistency import USUAL_COUNTS
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.stored.numbers import restored, wrap_of
 from winchkit.runs.importing.stored.sign_bits import LostSign, lost_sign, sign_by_jumps
-from winchkit.runs.importing.unit_spelling import COUNTS, SHARE
+from winchkit.runs.importing.units.known import COUNTS, SHARE
 from winchkit.schema.mapping import DATE, MODULO
 
 _TURN = 2 * math.pi

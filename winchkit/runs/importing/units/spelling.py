@@ -6,148 +6,24 @@ dimensions of this module: counts of an encoder, a share of the rated torque, a 
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection
-from dataclasses import dataclass
 from functools import lru_cache
 
-from winchkit.units import GRAVITY, UNITS
+from winchkit.runs.importing.units.known import COUNTS, SpelledUnit, known_unit
 
-COUNTS, COUNT_RATE, SHARE, BRIDGE = "counts", "counts per second", "share", "bridge"
-
-
-@dataclass(frozen=True)
-class SpelledUnit:
-    """A unit: SI value = factor × number + offset."""
-
-    text: str
-    """Spelling of winchkit where it has the unit, else that of the file."""
-    dimension: str
-    factor: float
-    offset: float = 0.0
-
-
-_TURN = 2 * math.pi
-_DEG = math.pi / 180
-_LB = 0.45359237 * GRAVITY
-_INCH = 0.0254
-_FOREIGN: dict[str, dict[float, str]] = {
-    "angle": {
-        _TURN: "turns rev revs revolution revolutions U Umdr Umdrehung Umdrehungen tr tour tours "
-        "vuelta vueltas giri rot rotation rotations cycles",
-        _DEG: "° º degs degree degrees Grad Altgrad degre degres grado grados gradi",
-        1.0: "radian radians Radiant",
-        1e-6: "urad",
-        _DEG / 60: "arcmin",
-        _DEG / 3600: "arcsec",
-    },
-    "angular speed": {
-        _TURN / 60: "1/min min-1 /min U/min Umin r/min rev/min tr/min turn/min turns/min g/min "
-        "giri/min RPM Upm mot-rpm",
-        _TURN: "turn/s turns/s rev/s revs/s rps U/s r/s tr/s",
-        _DEG: "°/s º/s degs/s deg/sec degree/s degrees/s Grad/s dps",
-        1.0: "rad/sec rads/s radian/s radians/s rads-1 1/s s-1",
-        _TURN / 60e3: "mrpm",
-    },
-    "torque": {
-        1.0: "Nm N-m Newtonmeter newton-meter newton-meters",
-        1e-3: "mNm mN-m Nmm N-mm",
-        1e-2: "cNm Ncm",
-        1e-6: "uNm",
-        1e3: "kNm",
-        _LB * _INCH: "lbin inlb lbfin inlbf lb-in in-lb",
-        _LB * 12 * _INCH: "lbft ftlb lbfft ftlbf lb-ft ft-lb",
-        GRAVITY: "kgfm kpm",
-        GRAVITY * 1e-2: "kgfcm kpcm",
-    },
-    "force": {
-        1.0: "Newton Newtons",
-        10.0: "daN",
-        1e-2: "cN",
-        1e6: "MN",
-        GRAVITY: "kgf kp",
-        GRAVITY * 1e-3: "gf p",
-        _LB: "lbf lb lbs pound pounds",
-        1e3 * _LB: "kip kips klbf klb",
-        _LB / 16: "ozf oz",
-    },
-    "mass": {1.0: "Kilogramm kilogram kilograms kilos", 1e-3: "Gramm gram grams gr"},
-    "length": {
-        1.0: "meter meters metre metres Meter",
-        1e-3: "millimeter millimeters millimetre millimetres",
-        1e-2: "centimeter centimeters centimetre centimetres",
-        0.1: "dm",
-        1e-6: "micrometer micron microns",
-        _INCH: "in inch inches ''",
-        12 * _INCH: "ft foot feet",
-    },
-    "speed": {1e-3 / 60: "mm/min", 1 / 3.6: "km/h"},
-    "time": {
-        1.0: "sec secs second seconds Sek Sekunde Sekunden seconde secondes segundo segundos",
-        1e-3: "msec msecs millisec millisecs millisecond milliseconds Millisekunden",
-        1e-6: "usec usecs microsec microsecs microsecond microseconds",
-        1e-9: "ns nsec nanosecond nanoseconds",
-        60.0: "minute minutes Minuten",
-        3600.0: "hr hrs hour hours Std Stunden",
-        86400.0: "d day days Tage",
-    },
-    "current": {1.0: "Ampere Amp Amps ampere amperes Aeff Arms A_rms A_eff", 1e-3: "mAeff mArms"},
-    "voltage": {1.0: "Volt Volts volts"},
-    "temperature": {1.0: "°C ºC C Celsius celsius °Celsius"},
-    COUNTS: {
-        1.0: "count counts cnt cnts ct inc incs incr Ink Inkr Inkremente increments tick ticks "
-        "pulse pulses qc digit digits LSB Imp Impulse steps puls ppr"
-    },
-    COUNT_RATE: {1.0: "counts/s cnt/s inc/s Inkr/s ticks/s qc/s pulses/s counts/sec cts/s"},
-    SHARE: {
-        1e-2: "% percent Prozent pct prozent porcent",
-        1e-3: "‰ permille Promille per-thousand perthousand 1/1000 0.1% %o",
-    },
-    BRIDGE: {1.0: "mV/V", 1e-3: "uV/V"},
-}
-_OTHER_OFFSET = {
-    "F": SpelledUnit("°F", "temperature", 5 / 9, -160 / 9),
-    "K": SpelledUnit("K", "temperature", 1.0, -273.15),
-}
-_DROPPED = re.compile(r"[\s·⋅*×•^_.]")
 _LONGEST = 200
 """Longest name with a unit, characters."""
-_PER_SECOND = re.compile(r"/\s*(sec|second|seconds|Sek|Sekunde)$")
 _PAIRS = {"[": "]", "(": ")", "{": "}"}
 _NO_UNIT = {"", "-", "--", "none", "n/a", "1", "/", "[]", "()", "bool", "no unit", "unitless"}
 
 
-def _key(text: str) -> str:
-    """A spelling without blanks, dots and signs of multiplication."""
-    plain = text.strip().replace("µ", "u").replace("μ", "u")
-    return _DROPPED.sub("", _PER_SECOND.sub("/s", plain))
-
-
-def _known() -> dict[str, SpelledUnit]:
-    found: dict[str, SpelledUnit] = {}
-    ours = (
-        *("angle", "angular speed", "torque", "force", "mass", "length", "speed", "time"),
-        *("current", "voltage", "temperature"),
-    )
-    for dimension in ours:
-        for unit, value in UNITS[dimension].items():
-            found[_key(unit)] = SpelledUnit(unit, dimension, value)
-    for dimension, spellings in _FOREIGN.items():
-        table = UNITS.get(dimension, {})
-        for value, words in spellings.items():
-            ours_too = next((name for name, other in table.items() if other == value), None)
-            for word in words.split():
-                found.setdefault(_key(word), SpelledUnit(ours_too or word, dimension, value))
-    for word in ("F", "°F", "degF", "Fahrenheit"):
-        found[_key(word)] = _OTHER_OFFSET["F"]
-    for word in ("K", "Kelvin"):
-        found[_key(word)] = _OTHER_OFFSET["K"]
-    return found
-
-
-_KNOWN = _known()
-_FOLDED = {key.casefold(): unit for key, unit in reversed(_KNOWN.items())}
+_SIZE = r"(?:\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?|10\s?\^\s?-?\d+|1\s?/\s?\d+)"
+_SCALED = re.compile(
+    rf"[x×*/]?\s*(?P<before>{_SIZE})\s*[x×*]?\s*(?P<unit>[^\W\d].*|[°%‰].*)"
+    rf"|(?P<unit2>[^\W\d].*?|[°%‰])\s*[x×*/]\s*(?P<after>{_SIZE})"
+)
+"""``0.1 rpm``, ``rpm x 10``: a unit and its multiple."""
 
 
 @lru_cache(4096)
@@ -157,16 +33,25 @@ def read_unit(text: str) -> SpelledUnit | None:
     ``text``: spelling, e.g. ``1/min`` or ``(Nm)``. Returns: the case counts where two units differ
     by it only (``mN``, ``MN``).
     """
+    if len(text) > _LONGEST:
+        return None
     inner = _inner(text)
-    # "V (Voltage)" and "A(rms)": a unit with a description.
-    first = re.split(r"\s+\(", inner)[0]
+    # "V (Voltage)", "A(rms)" and "% of rated": a unit with a description.
+    first = re.split(r"\s+(?:\(|of\b)", inner)[0]
     for spelling in (inner, first):
-        key = _key(spelling)
-        if key:
-            found = _KNOWN.get(key) or (_FOLDED.get(key.casefold()) if len(key) > 1 else None)
-            if found is not None:
-                return found
+        if (found := known_unit(spelling)) is not None:
+            return found
     return None
+
+
+def is_multiple(text: str) -> bool:
+    """Whether a text is a unit with a number, which may be the size of 1, a range or a resolution.
+
+    ``text``: ``0.1 rpm``, ``x10 rpm``, ``500 N``; not ``1/min``.
+    """
+    found = _SCALED.fullmatch(_inner(text))
+    is_unit = found is not None and read_unit(found["unit"] or found["unit2"]) is not None
+    return is_unit and read_unit(text) is None
 
 
 def _inner(text: str) -> str:
@@ -194,8 +79,13 @@ def split_unit(text: str) -> tuple[str, str]:
         for cut in re.finditer(rf"(?<=[^\s/]){mark}", plain):
             unit = plain[cut.end() :]
             known = read_unit(unit)
+            # "Force 1 kN" has a number of its own, "speed 0.1 rpm" a multiple.
+            is_size = is_multiple(unit) and not re.match(r"\d+\s*[^\W\d]", unit)
+            if known is None and is_size and not best[1]:
+                best = plain[: cut.start()], unit
             # The longest unit: ``speed_rad/s`` is not in seconds.
-            if known is not None and len(unit) > len(best[1]) and _is_safe(unit, mark, known):
+            is_longer = len(unit) > len(best[1]) and not is_multiple(best[1])
+            if known is not None and is_longer and _is_safe(unit, mark, known):
                 best = plain[: cut.start()], unit
     return best
 
@@ -224,7 +114,7 @@ def _in_brackets(text: str) -> tuple[str, str] | None:
         return (text.strip(), "") if is_square else None
     if inner.lower() in _NO_UNIT:
         return text[:start].strip(), ""
-    return (text[:start].strip(), inner) if is_square else None
+    return (text[:start].strip(), inner) if is_square or is_multiple(inner) else None
 
 
 def _brackets(text: str) -> list[tuple[int, int, str]]:
@@ -255,11 +145,19 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     if mark in {r"\s*/\s*", r"\s+in\s+", r"\s*,\s*"}:
         return True
     word = unit.strip()
-    if _key(word).casefold() in _SHORT_WORDS:
+    if word.casefold() in _SHORT_WORDS:
         return False
     if word.casefold() in _PLAIN_WORDS:
         return known.dimension == COUNTS
     return word not in {"m", "s", "N", "V", "min"} or mark == "_"
+
+
+def unit_as_name(name: str) -> SpelledUnit | None:
+    """The unit that is all of a name: ``ms``, ``rpm``; None for words that are more than units."""
+    word = name.strip()
+    if len(word) < 2 or word.casefold() in {*_SHORT_WORDS, *_PLAIN_WORDS, "min"}:
+        return None
+    return read_unit(word)
 
 
 def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:

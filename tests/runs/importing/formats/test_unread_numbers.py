@@ -1,0 +1,21 @@
+"""Columns of a channel whose cells are written as no number are told, not dropped in silence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+
+
+@pytest.mark.parametrize("cell", ["0x{:04X}", "({}.5)", "{}.5-", "{},5"])
+def test_a_torque_that_cannot_be_read_is_told(cell: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{k / 100};{k % 13};{cell.format(k % 7 + 1)}" for k in range(60))
+    path.write_text(f"time [s];angle [rad];torque [Nm]\n{rows}\n")
+    guess = guess_columns(read_table(str(path)))
+    used = {item.channel for item in guess.used}
+    told = [note for note in guess.notes if "'torque' is named like motor_torque" in note]
+    assert bool(told) == ("motor_torque" not in used)
