@@ -94,6 +94,12 @@ def require_mapping(values: object, name: str, what: str) -> Mapping[Any, Any]:
     raise UsageError(f"{name} is {_shown(values)}; pass a dict of {what}")
 
 
+def require_sequence(values: object, name: str, what: str) -> None:
+    """Raise UsageError where an argument is no sequence or array; ``what``: the one to pass."""
+    if isinstance(values, str) or not isinstance(values, Sequence | np.ndarray):
+        raise UsageError(f"{name} is {_shown(values)}; pass {what}")
+
+
 def path_of(value: object, name: str = "path") -> Path:
     """Argument that names a file or a folder.
 

@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from winchkit.arguments import real_numbers, require_type, require_types
+from winchkit.arguments import real_numbers, require_sequence, require_type, require_types
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation.groups import PulleyGroup, flat_pulleys
@@ -172,9 +172,7 @@ def identify_dahl(
     from scipy.optimize import least_squares
 
     require_types(records, PulleyRecord, "records")
-    if isinstance(wraps, str) or not isinstance(wraps, Sequence | np.ndarray):
-        kind = type(wraps).__name__
-        raise UsageError(f"wraps is a {kind}; pass a list of lists of wrap angles, one per group")
+    require_sequence(wraps, "wraps", "a list of lists of wrap angles, one per group")
     for index, group in enumerate(wraps):
         real_numbers(f"wraps[{index}]", group)
     samples = sum(len(record.cell) for record in records)

@@ -75,7 +75,7 @@ def test_cable_and_frame_are_distinguished_by_loads_over_the_stroke() -> None:
 
 
 def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
-    """λ of 16 is no chance, but too little to be named among forty: twice the load shows more of it."""
+    """λ of 16 is no chance, but too little to be named among forty: twice the load shows more."""
     regression = TimeSeriesRegression(dataset())
     frame = [CATALOGUE["frame-compliance"]]
     strength = separation(regression, _usual("frame-compliance"), None, NOISE)

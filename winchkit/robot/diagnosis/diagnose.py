@@ -17,6 +17,7 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.cross_validation import AT_NOISE
 from winchkit.diagnosis.regression.gls import fit
+from winchkit.diagnosis.regression.hypothesis import held
 from winchkit.diagnosis.regression.intervals import estimates
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
@@ -44,7 +45,7 @@ from winchkit.diagnosis.verdict.decision import remaining_share, verdict_of
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.laws import simplified, with_first_members
-from winchkit.diagnosis.verdict.profile_values import held, refitted_steps
+from winchkit.diagnosis.verdict.profile_values import refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage

@@ -140,8 +140,8 @@ def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
         table.column(item.source) is not None or not is_expression(item.source)
     ):
         return item
-    factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
-    source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
+    times = item.constant or ("" if item.factor is None else f"{item.factor!r}")
+    source = "-" * (item.sign < 0) + item.source + (f"*{times}" if times else "")
     scaled = scaled_column(table, source)
     if scaled is not None:
         name, size = scaled

@@ -226,10 +226,10 @@ def _known() -> dict[str, SpelledUnit]:
         for value, words in spellings.items()
         for word in words.split()
     ]
-    for unit in (*spelled, *_composed()):
-        table = UNITS.get(unit.dimension, {})
-        same = (name for name, other in table.items() if math.isclose(other, unit.factor))
-        found.setdefault(_key(unit.text), replace(unit, text=next(same, unit.text)))
+    for other in (*spelled, *_composed()):
+        table = UNITS.get(other.dimension, {})
+        same = (name for name, size in table.items() if math.isclose(size, other.factor))
+        found.setdefault(_key(other.text), replace(other, text=next(same, other.text)))
     for word in ("F", "°F", "degF", "Fahrenheit"):
         found[_key(word)] = _OTHER_OFFSET["F"]
     for word in ("K", "Kelvin"):
