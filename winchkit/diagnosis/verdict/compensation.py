@@ -61,6 +61,8 @@ def _doubted(step: Step, code: str, what: str, count: int) -> Step:
         f"{what} explains as much as these {count} effects together, beside the profile's own "
         "values and with fewer parameters: they may compensate each other"
     )
+    if any(doubt.code == code for doubt in step.doubts):
+        return step  # A curve speaks against it alone.
     law = "open" if code == "curve" else step.law
     return replace(step, law=law, certain=False, doubts=(*step.doubts, Doubt(code, text)))
 

@@ -1,0 +1,122 @@
+"""Values that compensate each other, and laws that are a part of another: doubted, never certain.
+
+The truth is a closed form: Coulomb, viscous and quadratic friction of a motor with an inertia.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from winchkit import diagnose, read_profile
+from winchkit.arrays import Array
+from winchkit.diagnosis.results import Diagnosis
+from winchkit.runs.run import Channel, Run
+
+COULOMB, VISCOUS, QUADRATIC, INERTIA = 0.03, 4e-4, 8e-6, 2e-4
+NOISE = 0.004
+KNOWN = """
+[motor]
+inertia = "2 kg cm^2"
+[[effect]]
+id = "motor-coulomb"
+torque = "30 mN m"
+[[effect]]
+id = "motor-viscous"
+viscosity = "0.4 mN m s"
+"""
+
+
+STEP, EVERY = 1e-3, 10
+"""Steps of the closed form, s, and how many there are in a sample."""
+
+
+def motion(fastest: float) -> tuple[Array, Array]:
+    """Time, s, and speed, rad/s: there and back at four speeds, with smooth ramps."""
+    time = np.arange(0.0, 24.0, STEP)
+    wanted = np.zeros_like(time)
+    for number, share in enumerate((0.15, 0.4, 0.7, 1.0)):
+        begin = 6.0 * number
+        wanted[(time > begin + 0.3) & (time < begin + 2.6)] = share * fastest
+        wanted[(time > begin + 3.1) & (time < begin + 5.4)] = -share * fastest
+    bell = np.hanning(421)
+    return time, np.convolve(wanted, bell / bell.sum(), mode="same")
+
+
+def runs(coulomb: float, viscous: float, quadratic: float, *, factor: float = 1.0) -> list[Run]:
+    """Two motions, each recorded twice."""
+    out = []
+    for number, fastest in enumerate((130.0, 130.0, 80.0, 80.0)):
+        time, speed = motion(fastest)
+        angle = cumulative_trapezoid(speed, dx=STEP, initial=0.0)
+        torque = (
+            INERTIA * np.gradient(speed, time)
+            + coulomb * np.tanh(speed / 0.2)
+            + viscous * speed
+            + quadratic * speed * np.abs(speed)
+        )
+        seen = factor * torque[::EVERY]
+        noise = np.random.default_rng(number).normal(0.0, NOISE, len(seen))
+        channels = {
+            "motor_angle": Channel(angle[::EVERY], "rad"),
+            "motor_torque": Channel(seen + noise, "N m"),
+        }
+        out.append(Run(f"r{number}", time[::EVERY], channels))
+    return out
+
+
+def diagnosed(folder: Path, recorded: list[Run], known: str = KNOWN) -> Diagnosis:
+    path = folder / "axis.toml"
+    path.write_text(f'schema = 1\nkind = "axis"\nname = "axis"\n{known}', encoding="utf-8")
+    return diagnose(recorded, read_profile(path)).diagnosis
+
+
+def doubts(found: Diagnosis) -> set[str]:
+    return {doubt.code for step in found.steps for doubt in step.doubts}
+
+
+@pytest.mark.slow
+def test_known_friction_that_moves_for_a_law_that_is_not_known_is_open(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, QUADRATIC))
+    moved = [step for step in found.steps if step.effects[0] in {"motor-coulomb", "motor-viscous"}]
+    assert moved
+    assert "curve" in doubts(found)
+    assert not any(step.certain for step in found.steps if step.law == "open")
+    assert all(step.law == "open" for step in moved)
+
+
+@pytest.mark.slow
+def test_a_factor_on_the_torque_is_told_beside_the_values_that_it_changes(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, factor=1.08))
+    assert len(found.steps) > 1
+    assert all("factor" in {doubt.code for doubt in step.doubts} for step in found.steps)
+    (text, *_) = [d.text for d in found.steps[0].doubts if d.code == "factor"]
+    assert float(text.partition("wrong by +")[2].partition("%")[0]) == pytest.approx(8.0, abs=0.5)
+    assert not any(step.certain for step in found.steps)
+
+
+@pytest.mark.slow
+def test_values_that_do_change_are_not_doubted(tmp_path: Path) -> None:
+    """Friction that grew by a third and viscous friction that halved: no curve, no factor."""
+    found = diagnosed(tmp_path, runs(4 / 3 * COULOMB, VISCOUS / 2, 0.0))
+    assert {step.effects[0] for step in found.steps} == {"motor-coulomb", "motor-viscous"}
+    assert all(step.certain and step.refitted for step in found.steps)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quadratic", [0.0, 3e-5])
+def test_a_law_that_leaves_its_own_variable_is_open(tmp_path: Path, quadratic: float) -> None:
+    """Quadratic friction beside unknown viscous and Coulomb friction: no value of it is certain."""
+    found = diagnosed(
+        tmp_path, runs(COULOMB, VISCOUS, quadratic), '[motor]\ninertia = "2 kg cm^2"\n'
+    )
+    for step in found.steps:
+        values = step.parameters[step.effects[0]]
+        truth = {"motor-coulomb": ("torque", COULOMB), "motor-viscous": ("viscosity", VISCOUS)}
+        if step.certain and step.effects[0] in truth:
+            name, true = truth[step.effects[0]]
+            assert abs(values[name].value - true) < 4 * values[name].std
+    assert bool(doubts(found) & {"curve"}) == bool(quadratic)
