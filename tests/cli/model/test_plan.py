@@ -49,6 +49,9 @@ def test_the_plan_is_a_programme_that_distinguishes_them(fat: list[Path], tmp_pa
     best = told["offers"][0]
     assert [set(p["effects"]) for p in best["separates"]] == [set(step["effects"])]
     assert best["separates"][0]["power"] > 0.9
+    assert best["minutes"] == min(
+        o["minutes"] for o in told["offers"] if o["separates"][0]["power"] > 0.9
+    )
     programme = read_programme(next_file)
     assert programme.repeat == 1, "the runs so far have repeats"
     reached = [step.to for step in programme.step if step.to is not None]

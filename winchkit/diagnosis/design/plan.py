@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.detectability import DetectionThreshold
 from winchkit.diagnosis.design.discrimination import (
@@ -44,31 +42,24 @@ class Offer:
     kind: CandidateProgramme
     minutes: float
     """Motion of all repeats, and the operator's work."""
-    noncentralities: tuple[float, ...]
-    """λ by which it separates each pair."""
+    powers: tuple[float, ...]
+    """Power to separate each pair."""
     shows: tuple[str, ...]
     """Effects of usual size that become detectable."""
-
-    @property
-    def powers(self) -> tuple[float, ...]:
-        """Power to separate each pair."""
-        return tuple(map(power_of, self.noncentralities))
 
     @property
     def worth(self) -> tuple[float, ...]:
         """Sort key, larger is better.
 
-        Pairs separated with at least 90 % power, then the product of λ over the pairs, to a tenth
-        of a decade, then per minute; where nothing is to be separated, effects that become
-        detectable per minute. Power saturates, and a set is decided on held-out blocks, which see
-        less than a known noise: measured by ``benchmarks/plan_runs.py``.
+        Pairs separated with at least 90 % power, then the sum of powers, then per minute; where
+        nothing is to be separated, effects that become detectable per minute.
         """
         separated = sum(power >= _HIGH_POWER for power in self.powers)
-        decades = round(float(np.sum(np.log10(np.add(self.noncentralities, 1.0)))), 1)
+        summed = round(sum(power for power in self.powers if power >= LEAST_POWER), 1)
         per_minute, detected_per_minute = 1 / self.minutes, len(self.shows) / self.minutes
         return (
-            (separated, decades, per_minute, detected_per_minute)
-            if max(self.powers, default=0.0) >= LEAST_POWER
+            (separated, summed, per_minute, detected_per_minute)
+            if summed
             else (0.0, 0.0, detected_per_minute, per_minute)
         )
 
@@ -117,8 +108,8 @@ def offers(
     for kind, run in candidates(dataset, operating_range):
         motion = run.dataset.recordings[0].signals.time[-1] / 60
         minutes = repeats * motion + _operator_minutes(kind)
-        noncentralities = tuple(
-            separation(run, a, b, noise, known=known, repeats=repeats)
+        powers = tuple(
+            power_of(separation(run, a, b, noise, known=known, repeats=repeats))
             for a, b, known in known_pairs
         )
         shows = tuple(
@@ -131,7 +122,7 @@ def offers(
                 + separation(run, term, None, noise, known=known, repeats=repeats),
             )
         )
-        out.append(Offer(kind, minutes, noncentralities, shows))
+        out.append(Offer(kind, minutes, powers, shows))
     return sorted(out, key=lambda offer: offer.worth, reverse=True)
 
 
