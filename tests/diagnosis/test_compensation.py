@@ -89,7 +89,7 @@ def test_known_friction_that_moves_for_a_law_that_is_not_known_is_open(tmp_path:
 
 
 @pytest.mark.slow
-def test_a_factor_on_the_torque_is_told_beside_the_values_that_it_changes(tmp_path: Path) -> None:
+def test_a_factor_on_the_torque_is_named_with_the_values_that_it_changes(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, factor=1.08))
     assert len(found.steps) > 1
     assert all("factor" in {doubt.code for doubt in step.doubts} for step in found.steps)

@@ -59,6 +59,7 @@ _MOTIONS = (
 )
 """Four motions that excite friction, elasticity, creep and the drum; rule of thumb."""
 _LOADS = {"": 1.0, ", half the load": 0.5, ", twice the load": 2.0}
+"""In units of the mean load so far: a ratio of four at weights that a bench has; convention."""
 CANDIDATE_PROGRAMMES = (
     *(
         replace(motion, name=motion.name + words, load=load)
@@ -138,7 +139,7 @@ def usual_temperature(dataset: Dataset) -> float | None:
 def candidates(
     dataset: Dataset, operating_range: OperatingRange
 ) -> Iterator[tuple[CandidateProgramme, TimeSeriesRegression]]:
-    """Each programme that these channels can tell from others, with the regression of its run.
+    """Each programme that these channels can distinguish, with the regression of its run.
 
     Loads are a choice where the load is known, temperatures where there is a thermometer.
     """

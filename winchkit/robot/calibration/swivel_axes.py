@@ -27,7 +27,8 @@ from winchkit.robot.identification.equations import RobotEquations, started
 
 _EVIDENCE = 45.0
 """Difference of criteria from which axes are named together: twice the largest of 200 robots with
-right axes. One axis gives 10 to 20: alone it cannot be told from exit points, and does no harm."""
+right axes. One axis gives 10 to 20: alone it cannot be distinguished from exit points, and does no
+harm."""
 
 
 def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Columns of a channel whose cells are written as no number are told, not dropped in silence."""
+"""Columns of a channel whose cells are written as no number are reported, not only dropped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from winchkit.runs.importing.guess import guess_columns
 
 
 @pytest.mark.parametrize("cell", ["0x{:04X}", "({}.5)", "{}.5-", "{},5"])
-def test_a_torque_that_cannot_be_read_is_told(cell: str, tmp_path: Path) -> None:
+def test_a_torque_that_cannot_be_read_is_reported(cell: str, tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = "\n".join(f"{k / 100};{k % 13};{cell.format(k % 7 + 1)}" for k in range(60))
     path.write_text(f"time [s];angle [rad];torque [Nm]\n{rows}\n")
