@@ -64,6 +64,7 @@ def valid(winch_run: winchkit.Run, tmp_path_factory: pytest.TempPathFactory) -> 
         "Run": winch_run,
         "WinchProfile": winchkit.read_profile(winchkit.find("profiles", "bench-spiral")),
         "Profile": winchkit.read_profile(winchkit.find("profiles", "bench-spiral")),
+        "Mapping[str, WinchProfile]": {},
         "RobotProfile": robot,
         "Robot": winchkit.robot.robot_of(robot),
         "SimBench": winchkit.read_simbench(winchkit.find("sim", "demo-elastic-rope")),
