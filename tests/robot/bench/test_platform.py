@@ -23,6 +23,8 @@ from winchkit.model.rotation import rotation_by
 from winchkit.robot import Pose, PosesFound, Robot
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.platform import Platform
+from winchkit.robot.bench.platform_pose import PlatformPose
+from winchkit.robot.geometry.forward import distance
 from winchkit.schema.bench import BenchSpec
 from winchkit.sim.live.bench import LiveBench
 
@@ -240,6 +242,22 @@ def test_lengths_that_fit_two_poses_move_nothing(
     with pytest.raises(NotPermitted, match="fit two poses of the platform that the cables can"):
         platform.move(goal)
     assert bench.snapshot.at_rest
+
+
+def test_the_pose_follows_a_motion_along_its_path(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond the distance up to which it continues from the pose found last, to within the elasticity
+    of the cables."""
+    searched: list[PosesFound] = []
+    monkeypatch.setattr(PlatformPose, "_require_one", lambda _self, found: searched.append(found))
+    before = bench.robot.pose
+    for step in (0.12, -0.12):
+        goal = bench.robot.moved({"x": step}, relative=True)
+        bench.robot.move(goal)
+        assert distance(bench.robot.pose, goal)[0] < 0.01
+    assert distance(bench.robot.pose, before)[0] < 0.01
+    assert not searched
 
 
 def test_a_bench_without_robot_has_no_platform(opened: Bench) -> None:

@@ -103,6 +103,7 @@ class Platform(HeldPlatform):
         share = planned.distance[:, None] / planned.path.length
         angles = planned.motor_angle + present + share * (kept - present)
         self._permit(planned, angles)
+        self._planned = planned
         self._scale_quick_stops(planned)
         curve = CubicSpline(planned.time, angles, bc_type="clamped")
         clock = PathTime(planned, self.planner.wiring.acceleration)

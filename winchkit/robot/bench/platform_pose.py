@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from winchkit.schema.robot_bench import RobotWiring
 
 if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
+    from winchkit.robot.bench.trajectory import PlatformTrajectory
 
 _NEAR = 0.1
 """Distance and rotation from the pose that was found last, m and rad, up to which the next one is
@@ -44,6 +45,8 @@ class PlatformPose:
         self.robot = robot
         self._bench = bench
         self._last: Pose | None = None
+        self._planned: PlatformTrajectory | None = None
+        """The motion that began last: the platform is on its path, or left it since."""
         self._winches = [winches[name] for name in robot.names]
         self.planner = Planner(
             robot, wiring, {one.name: one.wiring.limits for one in self._winches}
@@ -79,10 +82,13 @@ class PlatformPose:
 
         Raises NotPermitted where they fit no pose, or two that the cables can hold.
         """
-        angles, start = self._angles(), self._last or self.robot.home
-        pulled = self._forces(start)
-        found = self.robot.poses_at(angles, start, pulled, tolerance=np.inf, search=np.inf)
-        if not self._continues(found):
+        angles = self._angles()
+        for start in self._starts(angles):
+            pulled = self._forces(start)
+            found = self.robot.poses_at(angles, start, pulled, tolerance=np.inf, search=np.inf)
+            if self._continues(found, start):
+                break
+        else:
             found = self.robot.poses_at(angles, None, pulled, tolerance=np.inf, search=-1.0)
             self._require_one(found)
         if np.isfinite(found.pose.position).all():
@@ -105,11 +111,19 @@ class PlatformPose:
             "LENGTH`"
         )
 
-    def _continues(self, found: PosesFound) -> bool:
-        """Whether an iteration from the last pose, or from home, ended in the same solution."""
-        if self._last is not None:
-            return bool(distance(found.pose, self._last)[0] <= _NEAR)
-        turned = distance(Pose(self.robot.home.position, found.pose.rotation), self.robot.home)
+    def _starts(self, angles: Array) -> Iterator[Pose]:
+        """The pose that was found last, or home, and the nearest one of the last motion's path."""
+        yield self._last or self.robot.home
+        if self._planned is not None:
+            off = np.abs(self._planned.motor_angle - angles).max(axis=1)
+            nearest = int(np.argmin(off))
+            yield self._planned.pose[nearest : nearest + 1]
+
+    def _continues(self, found: PosesFound, start: Pose) -> bool:
+        """Whether an iteration from a pose of the platform, or from home, ended beside it."""
+        if start is not self.robot.home:
+            return bool(distance(found.pose, start)[0] <= _NEAR)
+        turned = distance(Pose(start.position, found.pose.rotation), start)
         return bool(turned[0] <= _UPRIGHT and np.all(np.abs(found.residual[0]) <= AGREEMENT))
 
     def _require_one(self, found: PosesFound) -> None:
