@@ -247,8 +247,7 @@ def test_lengths_that_fit_two_poses_move_nothing(
 def test_the_pose_follows_a_motion_along_its_path(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beyond the distance up to which it continues from the pose found last, to within the elasticity
-    of the cables."""
+    """Beyond the distance up to which it continues from the pose found last; cables are elastic."""
     searched: list[PosesFound] = []
     monkeypatch.setattr(PlatformPose, "_require_one", lambda _self, found: searched.append(found))
     before = bench.robot.pose
