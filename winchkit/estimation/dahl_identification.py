@@ -13,7 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from winchkit.arguments import real_numbers, require_sequence, require_type, require_types
+from winchkit.arguments import require_sequence, require_type, require_types
+from winchkit.array_arguments import real_numbers
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation.groups import PulleyGroup, flat_pulleys

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.arguments import is_real, real_numbers
+from winchkit.array_arguments import is_real, real_numbers
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.rendering import Plotted
