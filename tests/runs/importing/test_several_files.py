@@ -89,7 +89,7 @@ def test_units_of_a_sum_are_converted_and_must_be_of_one_kind(tmp_path: Path) ->
     run = imported(path, "motor_torque=a-b")
     assert run["motor_torque"] == pytest.approx(np.sin(TIME) - 0.1 * np.cos(TIME), abs=1e-6)
     for expression, told in (
-        ("a-c", "or convertible ones: 'a' [N m], 'c' [N]"),
+        ("a-c", "a sum of [N m] and [N] has no unit"),
         ("a-d*2", "there is no column 'd' for 'a-d*2.0'"),
     ):
         answers = Answers((read_column(f"motor_torque={expression}"),))

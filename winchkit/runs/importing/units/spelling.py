@@ -153,8 +153,11 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
 
 
 def unit_as_name(name: str) -> SpelledUnit | None:
-    """The unit that is all of a name: ``ms``, ``rpm``; None for words that are more than units."""
-    word = name.strip()
+    """The unit that is all of a name: ``ms``, ``rpm``; None for words that are more than units.
+
+    A low line stands for a slash (``rad_s``): ``t_r`` is a name with an index.
+    """
+    word = name.strip().replace("_", "/")
     if len(word) < 2 or word.casefold() in {*_SHORT_WORDS, *_PLAIN_WORDS, "min"}:
         return None
     return read_unit(word)
