@@ -140,8 +140,12 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     """Whether a word at the end of a name is a unit, and not a part of the name.
 
     ``joint_position_in``, ``motor_a`` and ``load_t`` have names of one or two letters; ``pos_rad``
-    and ``torque_Nm`` have units.
+    and ``torque_Nm`` have units. A low line within a unit is a slash (``rad_s``), or precedes an
+    index of it (``A_rms``): ``st_t_r`` is a name.
     """
+    inner = re.sub(r"(?i)_(rms|eff)$", "", unit)
+    if "_" in inner and read_unit(inner.replace("_", "/")) is None:
+        return False
     if mark in {r"\s*/\s*", r"\s+in\s+", r"\s*,\s*"}:
         return True
     word = unit.strip()
