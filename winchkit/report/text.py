@@ -42,7 +42,7 @@ from winchkit.report.words.sentence import (
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, step_text
+from winchkit.report.words.steps import alike, doubt_texts, step_text, told_steps
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -85,7 +85,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
         error_lines(
             diagnosis.outputs,
-            extended=bool(diagnosis.steps),
+            extended=bool(told_steps(diagnosis)),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),
@@ -138,19 +138,21 @@ def head_lines(diagnosis: Diagnosis) -> list[str]:
 def step_lines(
     diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = (), most: int | None = None
 ) -> list[str]:
-    """Every step with its doubts below.
+    """Every step that is told, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
     from which further steps are named only. Returns: lines of at most 80 characters.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
-    for number, (step, left) in enumerate(zip(diagnosis.steps, errors, strict=False), start=1):
-        own = paragraph(step_text(step, diagnosis.outputs, left), f"{number}. ", "   ")
+    told = told_steps(diagnosis)
+    for number, index in enumerate(told, start=1):
+        step = diagnosis.steps[index]
+        own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
         if most is not None and lines and len(lines) + len(own) > most:
-            left_out = [one.effects[0] for one in diagnosis.steps[number - 1 :]]
+            left_out = [diagnosis.steps[one].effects[0] for one in told[number - 1 :]]
             more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
             return [*lines, *paragraph(more, "", "  ")]
         lines += own

@@ -11,7 +11,7 @@ from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause
+from winchkit.report.words.steps import cause, told
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, clause, listed
 
 _MOVED = 1.05
@@ -36,7 +36,7 @@ _CONSTANT = ("winch", "pose")
 def headline(diagnosis: Diagnosis) -> str:
     """The result in one line: ``The drum has runout``; without a full stop."""
     worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
-    verdict, steps = diagnosis.verdict, diagnosis.steps
+    verdict, steps = diagnosis.verdict, told(diagnosis).steps
     if diagnosis.interrupted:
         return "The search was interrupted before a verdict"
     if wrong_channels(diagnosis):
@@ -60,20 +60,20 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def error_text(diagnosis: Diagnosis) -> str:
     """Sentence on the held-out error that falls most with the steps, without any on the worst."""
-    outputs = diagnosis.outputs
+    outputs, steps = diagnosis.outputs, told(diagnosis).steps
     if diagnosis.interrupted:
         return ""
     if wrong := wrong_channels(diagnosis):
         return f"{'; '.join(wrong)}."
-    if not diagnosis.steps:
+    if not steps:
         name = next(iter(worst_outputs(outputs)), "")
         return f"Held-out error: {size_texts(outputs)[name]}." if name else ""
-    first, *others = diagnosis.steps
+    first, *others = steps
     either = len(first.effects) > 1 and not first.whole
     opening = "With them" if others else "With either" if either else "With it"
     if not others and all(is_wrong_value(effect) for effect in first.effects):
         opening = "With either corrected" if either else "Corrected"
-    if all(step.refitted for step in diagnosis.steps):
+    if all(step.refitted for step in steps):
         opening = "Corrected"
     return gain_text(outputs, opening, most=1) or _NO_GAIN
 
@@ -92,7 +92,7 @@ def remaining_text(diagnosis: Diagnosis) -> str:
     share, parts = percent(diagnosis.unexplained_share), []
     if diagnosis.verdict != "undecided":
         parts.append(f"{share} of the error above the noise remains.")
-    elif diagnosis.steps:
+    elif told(diagnosis).steps:
         parts.append(f"At most {share} of the error above the noise remains.")
     if places := [where_text(where) for where in remaining_patterns(diagnosis)[:2]]:
         parts.append(f"Main pattern{'s' if len(places) > 1 else ''}: {'; '.join(places)}.")
@@ -115,7 +115,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
             f"To check: record {beyond}. If the new model misses it by more than the noise, this "
             "result is wrong."
         )
-    rest = "the rest" if diagnosis.steps else "it"
+    rest = "the rest" if told(diagnosis).steps else "it"
     return (
         f"To explain {rest}: write an effect of your own, or record a run that isolates its cause."
     )
