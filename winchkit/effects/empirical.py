@@ -32,6 +32,8 @@ _AT: Mapping[Output, tuple[Stage, str, float]] = {
 _NEEDS: Mapping[str, tuple[Need, ...]] = {
     "load": ("cable_force",),
     "tension": ("cable_force",),
+    "directed_load": ("cable_force",),
+    "directed_tension": ("cable_force",),
     "temperature": ("temperature",),
 }
 

@@ -72,7 +72,10 @@ def figures(diagnosis: Diagnosis) -> Markup:
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step that is told, with its doubts; ``without`` as in :func:`winchkit.report.text.step_lines`."""
+    """Every step that is told, with its doubts.
+
+    ``without``: as in :func:`winchkit.report.text.step_lines`.
+    """
     errors = [*without, *[{}] * len(diagnosis.steps)]
     items = []
     for index in told_steps(diagnosis):

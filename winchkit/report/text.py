@@ -7,7 +7,7 @@ from math import degrees, isnan
 from typing import TYPE_CHECKING
 
 from winchkit import wings
-from winchkit.diagnosis.data.sanity import ALARMING
+from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
@@ -39,6 +39,7 @@ from winchkit.report.words.sentence import (
     main_patterns,
     remaining_patterns,
     remaining_text,
+    unrelated_outputs,
     where_text,
     wrong_channels,
 )
@@ -345,7 +346,7 @@ def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
         lines += entries([f"'winchkit add {diagnosis.empirical[0]}' adds it as a curve"])
     share = told.partition(" Main pattern")[0]
     head = "patterns of the residual" if not share or share.startswith("Main") else share
-    return [head, *lines] if lines or share else []
+    return [*paragraph(head), *lines] if lines or share else []
 
 
 def _shape(answer: Answer, where: Attribution) -> str:
@@ -380,6 +381,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     """Caveats, findings on the data, and the share of the samples that is compared."""
     # The headline has wrong channels where nothing was searched.
     told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
+    if isinstance(result, Diagnosis) and unrelated_outputs(result):
+        told |= {UNRELATED}
     findings = finding_texts([f for f in result.sanity if f.code not in told])
     caveats = [caveat_text(code) for code in result.caveats if code not in told]
     quiet = [band for band in result.removed if all_shares and not band.above_noise]

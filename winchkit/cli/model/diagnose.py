@@ -137,8 +137,11 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     if column := _mending(diagnosis):
         suggest_next("import", runs, "--column", column, "-o", "corrected")
         return
+    from winchkit.report.words.sentence import unrelated_outputs
     from winchkit.report.words.steps import told
 
+    if unrelated_outputs(diagnosis):
+        return
     first = next(iter(told(diagnosis).steps), None)
     words = ("-p", asked.profile, *asked.options)
     if first is not None and len(first.effects) == 1:

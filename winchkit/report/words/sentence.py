@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isnan, pi
 
-from winchkit.diagnosis.data.sanity import ALARMING
+from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.quantity_text import percent, quantity, scale_for, significant
@@ -21,6 +21,10 @@ CLEAR_ORDER = 0.2
 """Least share of the residual variance from which an order within a turn precedes a trend."""
 _ABOVE = 1.5
 """Ratio of error to noise from which a sentence says that an output is above its noise."""
+_TAKEN = 0.005
+"""Share of the excess from which it is told what took it: half of the last digit of per cent."""
+_MOST_VALUES = 3
+"""Refitted values that are named."""
 _NO_GAIN = "No held-out error changes."
 _CHANGES = {
     "runs": ("other loads, strokes, speeds or temperatures", "another load, stroke or speed"),
@@ -47,9 +51,18 @@ def headline(diagnosis: Diagnosis) -> str:
         what = f"The {worst} error" if not steps else f"What remains of the {worst} error"
         return f"{what} may be noise: these runs cannot decide"
     if verdict == "unknown":
-        what = "No known effect explains" if not steps else "Known effects explain little of"
-        return f"{what} the {worst} error"
+        return _unknown_text(diagnosis, worst)
     return capital(cause(steps)) if steps else f"The {worst} error is explained in part"
+
+
+def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
+    """Headline where known effects explain little, or nothing."""
+    if told(diagnosis).steps:
+        return f"Known effects explain little of the {worst} error"
+    if lost := unrelated_outputs(diagnosis):
+        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        return f"The {names} {'does' if len(lost) == 1 else 'do'} not follow the motion"
+    return f"No known effect explains the {worst} error"
 
 
 def sentence(diagnosis: Diagnosis) -> str:
@@ -65,6 +78,8 @@ def error_text(diagnosis: Diagnosis) -> str:
         return ""
     if wrong := wrong_channels(diagnosis):
         return f"{'; '.join(wrong)}."
+    if lost := unrelated_outputs(diagnosis):
+        return _lost_text(outputs, lost)
     if not steps:
         name = next(iter(worst_outputs(outputs)), "")
         return f"Held-out error: {size_texts(outputs)[name]}." if name else ""
@@ -78,6 +93,38 @@ def error_text(diagnosis: Diagnosis) -> str:
     return gain_text(outputs, opening, most=1) or _NO_GAIN
 
 
+def unrelated_outputs(diagnosis: Diagnosis) -> list[str]:
+    """Outputs that do not follow the motion, where no effect is told; empty without any."""
+    if diagnosis.verdict != "unknown" or told(diagnosis).steps:
+        return []
+    named = [finding.channel for finding in diagnosis.sanity if finding.code == UNRELATED]
+    return [name for name in named if name in diagnosis.outputs]
+
+
+def _lost_text(outputs: Mapping[str, OutputFit], lost: Sequence[str]) -> str:
+    """``Repeats of the same motion differ by 0.135 N m rms, as much as it varies.``"""
+    sizes = [quantity(outputs[name].noise_rms or 0.0, outputs[name].unit) for name in lost]
+    varies = "it varies" if len(lost) == 1 else "they vary"
+    return f"Repeats of the same motion differ by {listed(sizes)} rms, as much as {varies}."
+
+
+def _refit_text(diagnosis: Diagnosis) -> str:
+    """What lowers the error where no step does: other values of the profile, all together."""
+    taken = 1.0 - diagnosis.unexplained_share
+    if told(diagnosis).steps or diagnosis.fit is None or not taken >= _TAKEN:
+        return ""
+    changed = []
+    for one in diagnosis.fit.parameters:
+        low, high = one.interval or (one.value - 2 * one.std, one.value + 2 * one.std)
+        if "." in one.name and not low <= one.initial <= high:
+            scale = scale_for((one.value, one.initial), one.unit)
+            name, parameter = one.name.split(".", 1)
+            new, old = scale.text(one.value), scale.text(one.initial)
+            changed.append(f"{name} {parameter.replace('_', ' ')} {new} instead of {old}")
+    values = f": {', '.join(changed[:_MOST_VALUES])}" if changed else ""
+    return f"; refitted values of the profile take {percent(taken)}{values}"
+
+
 def is_wrong_value(effect: str) -> bool:
     """Whether an effect is another value of something that the profile has already."""
     return clause(effect).endswith("is wrong")
@@ -89,9 +136,12 @@ def remaining_text(diagnosis: Diagnosis) -> str:
         return ""
     if diagnosis.verdict == "explained":
         return still_text(diagnosis.outputs)
+    lost = unrelated_outputs(diagnosis)
+    if lost and all(_at_noise(o) for name, o in diagnosis.outputs.items() if name not in lost):
+        return ""
     share, parts = percent(diagnosis.unexplained_share), []
     if diagnosis.verdict != "undecided":
-        parts.append(f"{share} of the error above the noise remains.")
+        parts.append(f"{share} of the error above the noise remains{_refit_text(diagnosis)}.")
     elif told(diagnosis).steps:
         parts.append(f"At most {share} of the error above the noise remains.")
     if places := [where_text(where) for where in remaining_patterns(diagnosis)[:2]]:
@@ -104,6 +154,12 @@ def changes_text(diagnosis: Diagnosis) -> str:
     other, beyond = _CHANGES[diagnosis.data]
     if wrong_channels(diagnosis):
         return "Correct the channel by an import, or confirm that it is right."
+    if lost := unrelated_outputs(diagnosis):
+        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        return (
+            f"Check the instrument of the {names}, its wiring and its column in the file: no "
+            "effect of the motion explains what differs between repeats."
+        )
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."
     if diagnosis.next_runs:
