@@ -17,7 +17,12 @@ from winchkit.quantity_text import (
     significant,
     unbroken,
 )
-from winchkit.report.detectability import untestable, useful_candidates, visible
+from winchkit.report.detectability import (
+    has_typical_sizes,
+    untestable,
+    useful_candidates,
+    visible,
+)
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
@@ -258,15 +263,21 @@ def fit_of(diagnosis: Diagnosis) -> Markup:
 
 def detectable(answer: Answer) -> Markup:
     """Smallest detectable size of every effect."""
+    compared = has_typical_sizes(answer)
     rows = [
-        [element("code", row.effect), parameter_name(row.parameter), row.text, _times(row.share)]
+        [
+            element("code", row.effect),
+            parameter_name(row.parameter),
+            row.text,
+            *([_times(row.share)] if compared else []),
+        ]
         for row in visible(answer)
     ]
     if not rows:
         return Markup("")
     data = answer.diagnosis.data
     caption = f"Smallest size of each effect that is detectable with these {data} at 90 % power."
-    head = ["effect", "parameter", "detectable", "of its typical size"]
+    head = ["effect", "parameter", "detectable", *(["of its typical size"] if compared else [])]
     seen = _shortened(caption, head, rows, "more, with larger detectable sizes")
     blind = [
         element("li", element("code", effect), f" needs {listed(needs)}")

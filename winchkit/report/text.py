@@ -26,7 +26,13 @@ from winchkit.report.comparison_rows import (
     short_rows,
     size_rows,
 )
-from winchkit.report.detectability import untestable, useful_candidates, visible
+from winchkit.report.detectability import (
+    Visible,
+    has_typical_sizes,
+    untestable,
+    useful_candidates,
+    visible,
+)
 from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
@@ -278,6 +284,8 @@ def _shown(answer: Answer) -> list[str]:
     rows, blind = visible(answer), [effect for effect, _ in untestable(answer)]
     if not rows:
         return []
+    if not has_typical_sizes(answer):
+        return _shown_sizes(answer, rows)
     able, count = [row for row in rows if row.usual], len(rows) + len(blind)
     data = answer.diagnosis.data
     head = (
@@ -296,6 +304,12 @@ def _shown(answer: Answer) -> list[str]:
     if blind:
         lines += entries([f"not tested, a part or a channel is missing: {', '.join(blind)}"])
     return lines
+
+
+def _shown_sizes(answer: Answer, rows: Sequence[Visible]) -> list[str]:
+    """The smallest sizes alone: a carriage may have any mass, and forces to match."""
+    sizes = [[row.effect, f"{row.parameter} {row.text}"] for row in rows]
+    return [f"detectable with these {answer.diagnosis.data} (90 % power)", *aligned(sizes, words=2)]
 
 
 def _confusion(diagnosis: Diagnosis) -> list[str]:
