@@ -27,7 +27,7 @@ from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.steps import alike, doubt_texts, step_text, told_steps
+from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -50,7 +50,7 @@ def output_scale(output: OutputFit) -> PrintScale:
 
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
-    extended = bool(told_steps(diagnosis))
+    extended = bool(reported_steps(diagnosis))
     # The two bounds of a noise need the room of the last column.
     known = all(output.noise_upper is None for output in diagnosis.outputs.values())
     head = ["output", "today" if extended else "error"]
@@ -77,13 +77,13 @@ def figures(diagnosis: Diagnosis) -> Markup:
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step that is told, with its doubts.
+    """Every step that is reported, with its doubts.
 
     ``without``: as in :func:`winchkit.report.text.step_lines`.
     """
     errors = [*without, *[{}] * len(diagnosis.steps)]
     items = []
-    for index in told_steps(diagnosis):
+    for index in reported_steps(diagnosis):
         step = diagnosis.steps[index]
         doubts = [
             element("li", capital(text), class_="doubt")

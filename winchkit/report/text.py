@@ -49,7 +49,7 @@ from winchkit.report.words.sentence import (
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, step_text, told_steps
+from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -92,7 +92,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
         error_lines(
             diagnosis.outputs,
-            extended=bool(told_steps(diagnosis)),
+            extended=bool(reported_steps(diagnosis)),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),
@@ -145,14 +145,14 @@ def head_lines(diagnosis: Diagnosis) -> list[str]:
 def step_lines(
     diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = (), most: int | None = None
 ) -> list[str]:
-    """Every step that is told, the largest share first, with its doubts below.
+    """Every step that is reported, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
     from which further steps are named only. Returns: lines of at most 80 characters.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
-    told = told_steps(diagnosis)
+    told = reported_steps(diagnosis)
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
         own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")

@@ -26,10 +26,10 @@ from winchkit.report.words.steps import (
     alike,
     doubt_texts,
     has_other_law,
+    reported,
+    reported_steps,
     step_text,
     step_title,
-    told,
-    told_steps,
 )
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name, parameter_name
 from winchkit.web.words import page_text
@@ -71,7 +71,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
                 "text": capital(step_text(step)),
                 "doubts": [capital(text) for text in doubt_texts(step, diagnosis.data)],
             }
-            for step in told(diagnosis).steps
+            for step in reported(diagnosis).steps
         ],
         "changes": changes_text(diagnosis),
         "patterns": [title for title, _ in patterns_of(diagnosis)],
@@ -88,7 +88,7 @@ def patterns_of(diagnosis: Diagnosis) -> list[tuple[str, int | Attribution]]:
     """Titles of the open laws, each with the index of its step, and of the remaining patterns."""
     found: list[tuple[str, int | Attribution]] = [
         (capital(step_title(diagnosis.steps[index])), index)
-        for index in told_steps(diagnosis)
+        for index in reported_steps(diagnosis)
         if has_other_law(diagnosis.steps[index]) and not diagnosis.steps[index].refitted
     ]
     if not found and diagnosis.verdict in {"partly", "unknown", "undecided"}:
@@ -122,7 +122,7 @@ def ladder(
     """
     diagnosis = answer.diagnosis
     today = {name: out.heldout_rms_before for name, out in diagnosis.outputs.items()}
-    steps = told(diagnosis).steps
+    steps = reported(diagnosis).steps
     named = [effect for step in steps[:1] for effect in step.effects]
     same = {effect for step in steps[:1] for effect in alike(step)}
     equal = {*named[:1], *same} if same else set()
@@ -227,7 +227,7 @@ def _focus(diagnosis: Diagnosis) -> str:
 
     changed = {
         name
-        for _ in told_steps(diagnosis)[:1]
+        for _ in reported_steps(diagnosis)[:1]
         for name, out in diagnosis.outputs.items()
         if out.heldout_rms_after < (1 - _CHANGE) * out.heldout_rms_before
     }

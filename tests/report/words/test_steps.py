@@ -16,9 +16,9 @@ from winchkit.report.words.steps import (
     cause,
     doubt_texts,
     lowered_most,
+    reported_steps,
     step_text,
     step_title,
-    told_steps,
 )
 
 OUTPUTS = {"cable_length": NOISY, "tension": AT_NOISE}
@@ -126,10 +126,10 @@ def _friction_refitted(torque: float, std: float, share: float) -> Step:
     return Step((name,), {name: values}, 0.5, share=share, refitted=True, file_values=old)
 
 
-def test_steps_are_told_in_the_order_of_what_they_explain() -> None:
+def test_steps_are_reported_in_the_order_of_what_they_explain() -> None:
     small, large = replace(FRICTION, share=0.2), replace(ELASTIC, share=0.7)
     diagnosis = diagnosis_of("explained", small, large)
-    assert told_steps(diagnosis) == [1, 0]
+    assert reported_steps(diagnosis) == [1, 0]
     assert [step["share"] for step in diagnosis.to_json()["steps"]] == [0.2, 0.7], (
         "the JSON has the order in which the model grew"
     )
@@ -137,7 +137,7 @@ def test_steps_are_told_in_the_order_of_what_they_explain() -> None:
     assert headline(diagnosis).startswith("2 effects are missing; first, the cable is elastic")
 
 
-def test_a_refit_that_agrees_with_the_file_and_explains_nothing_is_not_told() -> None:
+def test_a_refit_that_agrees_with_the_file_and_explains_nothing_is_not_reported() -> None:
     same = _friction_refitted(0.019996, 0.000077, 0.0005)
     diagnosis = diagnosis_of("explained", same, replace(ELASTIC, share=0.98))
     assert headline(diagnosis) == "The cable is elastic"
@@ -148,16 +148,18 @@ def test_a_refit_that_agrees_with_the_file_and_explains_nothing_is_not_told() ->
 @pytest.mark.parametrize(
     ("torque", "share"), [(0.0207, 0.0005), (0.019996, 0.02), (0.019996, float("nan"))]
 )
-def test_a_refit_that_differs_or_explains_something_is_told(torque: float, share: float) -> None:
+def test_a_refit_that_differs_or_explains_something_is_reported(
+    torque: float, share: float
+) -> None:
     step = _friction_refitted(torque, 0.000077, share)
     diagnosis = diagnosis_of("explained", step, replace(ELASTIC, share=0.98))
-    assert sorted(told_steps(diagnosis)) == [0, 1]
+    assert sorted(reported_steps(diagnosis)) == [0, 1]
     assert headline(diagnosis).endswith("; 1 effect of the profile has other values")
 
 
-def test_a_refit_alone_is_told_where_it_makes_the_verdict() -> None:
+def test_a_refit_alone_is_reported_where_it_makes_the_verdict() -> None:
     same = _friction_refitted(0.019996, 0.000077, 0.0005)
-    assert told_steps(diagnosis_of("explained", same)) == [0]
+    assert reported_steps(diagnosis_of("explained", same)) == [0]
     unknown = diagnosis_of("unknown", same)
-    assert told_steps(unknown) == []
+    assert reported_steps(unknown) == []
     assert headline(unknown).startswith("No known effect explains")

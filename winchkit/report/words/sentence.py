@@ -11,7 +11,7 @@ from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause, told
+from winchkit.report.words.steps import cause, reported
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, clause, listed
 
 _MOVED = 1.05
@@ -22,7 +22,7 @@ CLEAR_ORDER = 0.2
 _ABOVE = 1.5
 """Ratio of error to noise from which a sentence says that an output is above its noise."""
 _TAKEN = 0.005
-"""Share of the excess from which it is told what took it: half of the last digit of per cent."""
+"""Share of the excess from which the text names its cause: half of the last digit of per cent."""
 _MOST_VALUES = 3
 """Refitted values that are named."""
 _NO_GAIN = "No held-out error changes."
@@ -40,7 +40,7 @@ _CONSTANT = ("winch", "pose")
 def headline(diagnosis: Diagnosis) -> str:
     """The result in one line: ``The drum has runout``; without a full stop."""
     worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
-    verdict, steps = diagnosis.verdict, told(diagnosis).steps
+    verdict, steps = diagnosis.verdict, reported(diagnosis).steps
     if diagnosis.interrupted:
         return "The search was interrupted before a verdict"
     if wrong_channels(diagnosis):
@@ -57,7 +57,7 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
     """Headline where known effects explain little, or nothing."""
-    if told(diagnosis).steps:
+    if reported(diagnosis).steps:
         return f"Known effects explain little of the {worst} error"
     if lost := unrelated_outputs(diagnosis):
         names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
@@ -73,7 +73,7 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def error_text(diagnosis: Diagnosis) -> str:
     """Sentence on the held-out error that falls most with the steps, without any on the worst."""
-    outputs, steps = diagnosis.outputs, told(diagnosis).steps
+    outputs, steps = diagnosis.outputs, reported(diagnosis).steps
     if diagnosis.interrupted:
         return ""
     if wrong := wrong_channels(diagnosis):
@@ -94,8 +94,8 @@ def error_text(diagnosis: Diagnosis) -> str:
 
 
 def unrelated_outputs(diagnosis: Diagnosis) -> list[str]:
-    """Outputs that do not follow the motion, where no effect is told; empty without any."""
-    if diagnosis.verdict != "unknown" or told(diagnosis).steps:
+    """Outputs that do not follow the motion, where no effect is reported; empty without any."""
+    if diagnosis.verdict != "unknown" or reported(diagnosis).steps:
         return []
     named = [finding.channel for finding in diagnosis.sanity if finding.code == UNRELATED]
     return [name for name in named if name in diagnosis.outputs]
@@ -111,7 +111,7 @@ def _lost_text(outputs: Mapping[str, OutputFit], lost: Sequence[str]) -> str:
 def _refit_text(diagnosis: Diagnosis) -> str:
     """What lowers the error where no step does: other values of the profile, all together."""
     taken = 1.0 - diagnosis.unexplained_share
-    if told(diagnosis).steps or diagnosis.fit is None or not taken >= _TAKEN:
+    if reported(diagnosis).steps or diagnosis.fit is None or not taken >= _TAKEN:
         return ""
     changed = []
     for one in diagnosis.fit.parameters:
@@ -142,7 +142,7 @@ def remaining_text(diagnosis: Diagnosis) -> str:
     share, parts = percent(diagnosis.unexplained_share), []
     if diagnosis.verdict != "undecided":
         parts.append(f"{share} of the error above the noise remains{_refit_text(diagnosis)}.")
-    elif told(diagnosis).steps:
+    elif reported(diagnosis).steps:
         parts.append(f"At most {share} of the error above the noise remains.")
     if places := [where_text(where) for where in remaining_patterns(diagnosis)[:2]]:
         parts.append(f"Main pattern{'s' if len(places) > 1 else ''}: {'; '.join(places)}.")
@@ -171,7 +171,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
             f"To check: record {beyond}. If the new model misses it by more than the noise, this "
             "result is wrong."
         )
-    rest = "the rest" if told(diagnosis).steps else "it"
+    rest = "the rest" if reported(diagnosis).steps else "it"
     return (
         f"To explain {rest}: write an effect of your own, or record a run that isolates its cause."
     )

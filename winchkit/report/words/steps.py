@@ -29,14 +29,14 @@ _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
 _NEGLIGIBLE = 0.01
-"""Share of the excess below which a refitted value that agrees with the file's is not told."""
+"""Share of the excess below which a refitted value that agrees with the file's is not reported."""
 _NORMAL_95 = 1.96
 """Standard deviations on each side of a 95 % interval, where none was computed."""
 _D = TypeVar("_D", bound=Diagnosis)
 
 
-def told_steps(diagnosis: Diagnosis) -> list[int]:
-    """Indices of the steps that are told, the largest share first; robots' without one before.
+def reported_steps(diagnosis: Diagnosis) -> list[int]:
+    """Indices of the steps that are reported, the largest share first; robots' without one before.
 
     A refitted effect of the profile that explains less than a hundredth, and whose values agree
     with those of the file, is left out unless it alone makes the verdict.
@@ -47,9 +47,9 @@ def told_steps(diagnosis: Diagnosis) -> list[int]:
     return ranked if not told and diagnosis.verdict in {"explained", "partly"} else told
 
 
-def told(diagnosis: _D) -> _D:
-    """A diagnosis with the steps that are told, in their order; the JSON has all of them."""
-    chosen = tuple(diagnosis.steps[index] for index in told_steps(diagnosis))
+def reported(diagnosis: _D) -> _D:
+    """A diagnosis with the steps that are reported, in their order; the JSON has all of them."""
+    chosen = tuple(diagnosis.steps[index] for index in reported_steps(diagnosis))
     return diagnosis if chosen == diagnosis.steps else replace(diagnosis, steps=chosen)
 
 
