@@ -98,7 +98,7 @@ def test_drag_in_proportion_to_the_load_follows_load_and_direction_not_the_time(
     followed = compare(runs, GROOVED).outputs["tension"].follows
     shares = dict(followed)
     assert followed[0][0] == "directed_load"
-    assert shares["directed_load"] > 0.9
+    assert shares["directed_load"] > shares["direction"] + 0.2, "the load is in it"
     assert "time" not in shares
 
 

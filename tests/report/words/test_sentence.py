@@ -241,7 +241,7 @@ def test_an_output_that_does_not_follow_the_motion_is_named() -> None:
 
 def test_what_refitted_values_take_is_reported_where_no_step_does() -> None:
     values = [
-        FittedParameter("motor-coulomb.torque", 0.02235, 3.6e-4, "N m", 0.020, (0.0216, 0.0231)),
+        FittedParameter("motor-coulomb.torque", 0.02240, 3.6e-4, "N m", 0.020, (0.0216, 0.0231)),
         FittedParameter("rotor-inertia.inertia", 1.21e-4, 3e-6, "kg m^2", 1.2e-4, (1.1e-4, 1.3e-4)),
         FittedParameter("length offset", 1e-3, 1e-6, "m", 0.0, (0.9e-3, 1.1e-3)),
     ]
