@@ -253,3 +253,20 @@ def test_what_refitted_values_take_is_reported_where_no_step_does() -> None:
     )
     assert "take" not in remaining_text(replace(diagnosis, unexplained_share=0.999))
     assert "take" not in remaining_text(replace(diagnosis, steps=(ELASTIC,)))
+
+
+def test_an_order_of_a_bend_does_not_precede_the_bend() -> None:
+    """A cubic spring over half a metre has a fifth of its variance in a sine of a quarter."""
+    wave, bend = (
+        Attribution("force", "position", 0.22, order=25),
+        Attribution("force", "position", 0.8),
+    )
+    assert main_patterns([bend, wave]) == [bend]
+    assert main_patterns([replace(bend, share=0.4), wave]) == [wave]
+
+
+def test_steps_beside_an_output_that_does_not_follow_the_motion_do_not_hide_it() -> None:
+    lost = Finding("unrelated", "", "tension", float("nan"), "")
+    assert headline(diagnosis_of("unknown", ELASTIC, sanity=(lost,))) == (
+        "The tension does not follow the motion"
+    )

@@ -57,11 +57,11 @@ def headline(diagnosis: Diagnosis) -> str:
 
 def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
     """Headline where known effects explain little, or nothing."""
-    if reported(diagnosis).steps:
-        return f"Known effects explain little of the {worst} error"
     if lost := unrelated_outputs(diagnosis):
         names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
         return f"The {names} {'does' if len(lost) == 1 else 'do'} not follow the motion"
+    if reported(diagnosis).steps:
+        return f"Known effects explain little of the {worst} error"
     return f"No known effect explains the {worst} error"
 
 
@@ -94,8 +94,8 @@ def error_text(diagnosis: Diagnosis) -> str:
 
 
 def unrelated_outputs(diagnosis: Diagnosis) -> list[str]:
-    """Outputs that do not follow the motion, where no effect is reported; empty without any."""
-    if diagnosis.verdict != "unknown" or reported(diagnosis).steps:
+    """Outputs that do not follow the motion, under the verdict ``unknown``; empty without any."""
+    if diagnosis.verdict != "unknown":
         return []
     named = [finding.channel for finding in diagnosis.sanity if finding.code == UNRELATED]
     return [name for name in named if name in diagnosis.outputs]
@@ -213,12 +213,17 @@ def often_per_turn(angle: str, order: int) -> str:
 def main_patterns(places: Sequence[Attribution]) -> list[Attribution]:
     """The most specific attribution of each output, the most specific output first.
 
-    A clear order within a turn precedes a trend, and a trend a constant of a robot's line.
+    A clear order within a turn precedes a trend, unless that explains more than twice as much: a
+    bend has a part of every order. A trend precedes a constant of a robot's line.
     """
+    trends: dict[str, float] = {}
+    for place in places:
+        if place.order is None and place.frequency is None:
+            trends[place.output] = max(place.share, trends.get(place.output, 0.0))
     ranked = sorted(
         places,
         key=lambda w: (
-            w.order is None or w.share < CLEAR_ORDER,
+            w.order is None or w.share < max(CLEAR_ORDER, trends.get(w.output, 0.0) / 2),
             w.variable in _CONSTANT,
             w.frequency is not None,
         ),
