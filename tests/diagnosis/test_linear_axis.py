@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -18,9 +19,12 @@ from winchkit.diagnosis.add import fitted_addition
 from winchkit.diagnosis.compare import compared
 from winchkit.diagnosis.data.requirements import missing_needs
 from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.empirical import shown_id
 from winchkit.errors import FileError, RunError
+from winchkit.report.figures.reduction import curve_of
 from winchkit.report.pages.pages import addition_html, comparison_html, report_html
 from winchkit.report.text import report_text
 from winchkit.runs.run import Channel, Run
@@ -197,3 +201,40 @@ def test_the_page_is_in_newtons(folder: Path, tmp_path: Path) -> None:
         assert not OF_TURNS.findall(json.dumps([shown, card], default=str, ensure_ascii=False))
     finally:
         page.close()
+
+
+def bent(seed: int, shape: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Run:
+    """A run with a further force over the position."""
+    plain = run(seed)
+    force = Channel(plain["force"] + shape(plain["position"]), "N")
+    return replace(plain, channels={**plain.channels, "force": force})
+
+
+def test_a_period_is_drawn_over_one_period(folder: Path) -> None:
+    """The teeth of a linear motor, 24 mm apart: one whole wave of 8 N within 24 mm."""
+    teeth = [bent(s, lambda x: 8.0 * np.sin(2 * np.pi / 0.024 * x)) for s in (1, 2)]
+    found = compared(teeth, profile(folder / "linear.toml"))
+    order = round(2 * np.pi / 0.024)
+    curve = curve_of(found.regression, found.residual, Attribution("force", "position", 1.0, order))
+    assert np.ptp(curve.x) == pytest.approx(0.024, rel=0.1)
+    wave = curve.mean - curve.mean.mean()
+    power = np.abs(np.fft.rfft(wave)) ** 2
+    assert int(np.argmax(power)) == 1
+    assert np.sqrt(2 * np.mean(wave**2)) == pytest.approx(8.0, rel=0.15)
+
+
+def test_a_bend_over_the_travel_is_no_period(folder: Path) -> None:
+    """A cubic spring over 0.5 m, which a sine of 0.35 m resembles."""
+    springs = [bent(s, lambda x: -160.0 * x * (1.0 - (x / 0.18) ** 2)) for s in (1, 2)]
+    found = compared(springs, profile(folder / "linear.toml")).comparison
+    travel = float(np.ptp(springs[0]["position"]))
+    assert all(2 * np.pi / order <= 0.51 * travel for _, order, _ in found.outputs["force"].orders)
+
+
+def test_the_curve_of_a_linear_axis_has_its_names() -> None:
+    where = Attribution("force", "position", 0.8)
+    assert shown_id(where.output, where.variable) == "empirical-force-position"
+    effect = load_catalogue()["empirical-force-position"]
+    assert effect is load_catalogue()["empirical-motor-torque-motor-angle"]
+    assert "empirical-force-speed" in load_catalogue()
+    assert "empirical-force-nothing" not in load_catalogue()

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import overload
 
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.data.sanity import caveats
+from winchkit.diagnosis.data.sanity import caveats, unrelated
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
@@ -80,6 +80,7 @@ from winchkit.tabular import Columns, Tabular
 _PREDICTED = 0.1
 """Share of a residual that a curve or an order must predict for it to be a missing effect."""
 _REPEAT = "record the same motion again: without repeats the noise is not known"
+_VARY = "record a motion in which an output varies by more than its noise: in these runs none does"
 
 
 class Answer(Plotted, Tabular):
@@ -347,7 +348,9 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         ),
     )
     pairs = pairs_of(sets)
-    repeat = [NextRun((), _REPEAT)] if verdict == "undecided" else []
+    advice = _VARY if noise.from_repeats else _REPEAT
+    repeat = [NextRun((), advice)] if verdict == "undecided" else []
+    lost = sorted(known.refuted - known.deciding) if noise.from_repeats else []
     diagnosis = Diagnosis(
         verdict=verdict,
         outputs=outputs,
@@ -368,7 +371,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
             *missing_excitation(regression),
             *best.notes,
         ),
-        sanity=dataset.sanity,
+        sanity=(*dataset.sanity, *unrelated(lost)),
         used_share=dataset.used_share,
         removed=dataset.removed,
         caveats=dataset.caveats,

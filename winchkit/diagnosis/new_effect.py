@@ -12,7 +12,7 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import check_own, write_own, write_wave_on_drum
-from winchkit.effects.empirical import EMPIRICAL
+from winchkit.effects.empirical import EMPIRICAL, LINEAR_IDS
 from winchkit.errors import UsageError, suggest
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -79,6 +79,7 @@ def new_effect(
             write_wave_on_drum(order, name, file)
             return f"a wave of {order} periods per drum turn"
         curve = found.empirical[0]
+    curve = LINEAR_IDS.get(curve, curve)
     if curve not in EMPIRICAL:
         raise UsageError(f"'{curve}' is no empirical effect{suggest(curve, list(EMPIRICAL))}")
     progress(f"fitting {curve}", 1.0)

@@ -11,7 +11,7 @@ from winchkit.diagnosis.data.low_pass import RemovedBand
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.maps import ResidualMap
 from winchkit.diagnosis.residuals.traces import OutputTrace, PoseTrace, trace_columns
-from winchkit.effects.empirical import empirical_id
+from winchkit.effects.empirical import shown_id
 from winchkit.effects.placement import HOME
 from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Plotted
@@ -322,7 +322,7 @@ class Diagnosis(Plotted, Tabular):
     @property
     def empirical(self) -> tuple[str, ...]:
         """Empirical effects that would describe the unexplained residual, largest share first."""
-        names = [empirical_id(w.output, w.variable) for w in self.where if w.frequency is None]
+        names = [shown_id(w.output, w.variable) for w in self.where if w.frequency is None]
         return tuple(dict.fromkeys(names))
 
     def to_json(self) -> dict[str, Any]:

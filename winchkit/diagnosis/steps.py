@@ -138,7 +138,10 @@ def with_standing(
         what = "the error that it leaves is more than a tenth of what it explains"
         doubts.append(Doubt("remaining", what))
     if standing.rounded:
-        what = f"{standing.rounded} with a reversal rounded over a speed explains nine tenths of it"
+        what = (
+            f"the simpler {standing.rounded} explains nine tenths of it, if friction may build up "
+            "gradually at a reversal"
+        )
         doubts.append(Doubt("reversal", what))
     if small:
         what = "another step explains ten times as much there: it may be a deviation of that law"

@@ -13,7 +13,7 @@ from pkgutil import iter_modules
 from winchkit import wings
 from winchkit.arguments import require_types
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
-from winchkit.effects.empirical import EMPIRICAL
+from winchkit.effects.empirical import EMPIRICAL, LINEAR_IDS
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.stages import OUTPUTS
 from winchkit.units import UNITS, dimension_of
@@ -63,6 +63,7 @@ class Catalogue:
         return len(self._by_id)
 
     def __contains__(self, effect_id: object) -> bool:
+        effect_id = LINEAR_IDS.get(str(effect_id), effect_id)
         return effect_id in {**self._of_winches, **self._empirical} or effect_id in self._by_id
 
     def mapped(self, change: Callable[[Effect], Effect]) -> Catalogue:
@@ -71,6 +72,7 @@ class Catalogue:
         return Catalogue(map(change, self.of_winches()), empirical=empirical)
 
     def __getitem__(self, effect_id: str) -> Effect:
+        effect_id = LINEAR_IDS.get(effect_id, effect_id)
         found = self._of_winches.get(effect_id) or self._empirical.get(effect_id)
         found = found or self._by_id.get(effect_id)
         if found is None:

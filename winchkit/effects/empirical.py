@@ -15,7 +15,7 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Need, Output, Parameter, Values, order_per_turn
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
-from winchkit.schema.linear_axis import rotary_name
+from winchkit.schema.linear_axis import CHANNELS, rotary_name
 
 KNOTS = 9
 """Knots of a curve over one variable; twice as many over two variables."""
@@ -32,6 +32,8 @@ _AT: Mapping[Output, tuple[Stage, str, float]] = {
 _NEEDS: Mapping[str, tuple[Need, ...]] = {
     "load": ("cable_force",),
     "tension": ("cable_force",),
+    "directed_load": ("cable_force",),
+    "directed_tension": ("cable_force",),
     "temperature": ("temperature",),
 }
 
@@ -43,7 +45,12 @@ def empirical_id(output: str, variable: str) -> str:
     Returns:
     ``empirical-OUTPUT-VARIABLE`` with hyphens.
     """
-    return f"empirical-{rotary_name(output)}-{rotary_name(variable)}".replace("_", "-")
+    return shown_id(rotary_name(output), rotary_name(variable))
+
+
+def shown_id(output: str, variable: str) -> str:
+    """The same with the names of a result: ``empirical-force-position`` on a linear axis."""
+    return f"empirical-{output}-{variable}".replace("_", "-")
 
 
 def variable_of(effect: Effect) -> str:
@@ -143,3 +150,12 @@ EMPIRICAL: Mapping[str, Effect] = {
     for effect in [(_over_turns if variable in ANGLES else _spline)(output, variable)]
 }
 """By id, e.g. ``empirical-motor-torque-drum-angle``."""
+LINEAR_IDS: Mapping[str, str] = {
+    shown: own
+    for output in _AT
+    for variable in VARIABLES
+    for own in [empirical_id(output, variable)]
+    for shown in [shown_id(CHANNELS.get(output, output), CHANNELS.get(variable, variable))]
+    if shown != own
+}
+"""Id by that with the names of a linear axis."""

@@ -45,12 +45,16 @@ VARIABLES: Mapping[str, Callable[[At], Array]] = {
     "reversal_distance": _reversal_distance,
     "load": lambda at: at.tension,
     "tension": lambda at: at.tension,
+    "directed_load": lambda at: at.tension * _direction(at),
+    "directed_tension": lambda at: at.tension * _direction(at),
     "temperature": lambda at: at.temperature,
 }
 """Arrays (n,) along a run; ``load`` and ``tension`` are the cable force, whichever is known.
 
-``directed_length`` is the free length while winding in, its negative while paying out, and zero at
-rest: friction at one position of the stroke is a curve over it.
+``directed_load`` and ``directed_tension`` are that force while winding in, its negative while
+paying out, and zero at rest: friction in proportion to the load is a line over it.
+``directed_length`` is the free length with the same sign: friction at one position of the stroke
+is a curve over it.
 """
 
 VARIABLE_UNITS: Mapping[str, str] = {
@@ -65,9 +69,15 @@ VARIABLE_UNITS: Mapping[str, str] = {
     "reversal_distance": "1",
     "load": "N",
     "tension": "N",
+    "directed_load": "N",
+    "directed_tension": "N",
     "temperature": "degC",
 }
 ANGLES = ("drum_angle", "motor_angle")
 """Variables with a period of one turn."""
-COMPOUND: Mapping[str, tuple[str, ...]] = {"directed_length": ("cable_length", "direction")}
-"""Pairs of variables for residual maps."""
+COMPOUND: Mapping[str, tuple[str, ...]] = {
+    "directed_length": ("cable_length", "direction"),
+    "directed_load": ("load", "direction"),
+    "directed_tension": ("tension", "direction"),
+}
+"""Products of two variables, with both of them."""

@@ -37,6 +37,13 @@ class Visible:
         return self.share <= 1.0
 
 
+def has_typical_sizes(answer: Answer) -> bool:
+    """Whether sizes are compared with typical ones, which are those of motors and winches."""
+    return not (
+        isinstance(answer, WinchAnswer) and answer.engine.regression.dataset.profile.is_linear
+    )
+
+
 def effects_of(answer: Answer) -> dict[str, Effect]:
     """Every effect that a diagnosis tested or that its model has, by id."""
     tried = {score.candidate.effect.id: score.candidate.effect for score in answer.result.scores}

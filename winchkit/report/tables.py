@@ -17,12 +17,17 @@ from winchkit.quantity_text import (
     significant,
     unbroken,
 )
-from winchkit.report.detectability import untestable, useful_candidates, visible
+from winchkit.report.detectability import (
+    has_typical_sizes,
+    untestable,
+    useful_candidates,
+    visible,
+)
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.steps import alike, doubt_texts, step_text
+from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -45,7 +50,7 @@ def output_scale(output: OutputFit) -> PrintScale:
 
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
-    extended = bool(diagnosis.steps)
+    extended = bool(reported_steps(diagnosis))
     # The two bounds of a noise need the room of the last column.
     known = all(output.noise_upper is None for output in diagnosis.outputs.values())
     head = ["output", "today" if extended else "error"]
@@ -72,15 +77,19 @@ def figures(diagnosis: Diagnosis) -> Markup:
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step with its doubts; ``without`` as in :func:`winchkit.report.text.step_lines`."""
+    """Every step that is reported, with its doubts.
+
+    ``without``: as in :func:`winchkit.report.text.step_lines`.
+    """
     errors = [*without, *[{}] * len(diagnosis.steps)]
     items = []
-    for step, left in zip(diagnosis.steps, errors, strict=False):
+    for index in reported_steps(diagnosis):
+        step = diagnosis.steps[index]
         doubts = [
             element("li", capital(text), class_="doubt")
             for text in doubt_texts(step, diagnosis.data)
         ]
-        text = unbroken(capital(step_text(step, diagnosis.outputs, left)))
+        text = unbroken(capital(step_text(step, diagnosis.outputs, errors[index])))
         items.append(element("li", text, *([element("ul", *doubts)] if doubts else [])))
     return element("ol", *items, class_="found") if items else Markup("")
 
@@ -254,15 +263,21 @@ def fit_of(diagnosis: Diagnosis) -> Markup:
 
 def detectable(answer: Answer) -> Markup:
     """Smallest detectable size of every effect."""
+    compared = has_typical_sizes(answer)
     rows = [
-        [element("code", row.effect), parameter_name(row.parameter), row.text, _times(row.share)]
+        [
+            element("code", row.effect),
+            parameter_name(row.parameter),
+            row.text,
+            *([_times(row.share)] if compared else []),
+        ]
         for row in visible(answer)
     ]
     if not rows:
         return Markup("")
     data = answer.diagnosis.data
     caption = f"Smallest size of each effect that is detectable with these {data} at 90 % power."
-    head = ["effect", "parameter", "detectable", "of its typical size"]
+    head = ["effect", "parameter", "detectable", *(["of its typical size"] if compared else [])]
     seen = _shortened(caption, head, rows, "more, with larger detectable sizes")
     blind = [
         element("li", element("code", effect), f" needs {listed(needs)}")

@@ -7,7 +7,7 @@ from math import degrees, isnan
 from typing import TYPE_CHECKING
 
 from winchkit import wings
-from winchkit.diagnosis.data.sanity import ALARMING
+from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
@@ -26,7 +26,13 @@ from winchkit.report.comparison_rows import (
     short_rows,
     size_rows,
 )
-from winchkit.report.detectability import untestable, useful_candidates, visible
+from winchkit.report.detectability import (
+    Visible,
+    has_typical_sizes,
+    untestable,
+    useful_candidates,
+    visible,
+)
 from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
@@ -39,10 +45,11 @@ from winchkit.report.words.sentence import (
     main_patterns,
     remaining_patterns,
     remaining_text,
+    unrelated_outputs,
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, step_text
+from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -85,7 +92,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
         error_lines(
             diagnosis.outputs,
-            extended=bool(diagnosis.steps),
+            extended=bool(reported_steps(diagnosis)),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),
@@ -138,19 +145,21 @@ def head_lines(diagnosis: Diagnosis) -> list[str]:
 def step_lines(
     diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = (), most: int | None = None
 ) -> list[str]:
-    """Every step with its doubts below.
+    """Every step that is reported, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
     from which further steps are named only. Returns: lines of at most 80 characters.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
-    for number, (step, left) in enumerate(zip(diagnosis.steps, errors, strict=False), start=1):
-        own = paragraph(step_text(step, diagnosis.outputs, left), f"{number}. ", "   ")
+    told = reported_steps(diagnosis)
+    for number, index in enumerate(told, start=1):
+        step = diagnosis.steps[index]
+        own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
         if most is not None and lines and len(lines) + len(own) > most:
-            left_out = [one.effects[0] for one in diagnosis.steps[number - 1 :]]
+            left_out = [diagnosis.steps[one].effects[0] for one in told[number - 1 :]]
             more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
             return [*lines, *paragraph(more, "", "  ")]
         lines += own
@@ -275,6 +284,8 @@ def _shown(answer: Answer) -> list[str]:
     rows, blind = visible(answer), [effect for effect, _ in untestable(answer)]
     if not rows:
         return []
+    if not has_typical_sizes(answer):
+        return _shown_sizes(answer, rows)
     able, count = [row for row in rows if row.usual], len(rows) + len(blind)
     data = answer.diagnosis.data
     head = (
@@ -293,6 +304,12 @@ def _shown(answer: Answer) -> list[str]:
     if blind:
         lines += entries([f"not tested, a part or a channel is missing: {', '.join(blind)}"])
     return lines
+
+
+def _shown_sizes(answer: Answer, rows: Sequence[Visible]) -> list[str]:
+    """The smallest sizes alone: a carriage may have any mass, and forces to match."""
+    sizes = [[row.effect, f"{row.parameter} {row.text}"] for row in rows]
+    return [f"detectable with these {answer.diagnosis.data} (90 % power)", *aligned(sizes, words=2)]
 
 
 def _confusion(diagnosis: Diagnosis) -> list[str]:
@@ -343,7 +360,7 @@ def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
         lines += entries([f"'winchkit add {diagnosis.empirical[0]}' adds it as a curve"])
     share = told.partition(" Main pattern")[0]
     head = "patterns of the residual" if not share or share.startswith("Main") else share
-    return [head, *lines] if lines or share else []
+    return [*paragraph(head), *lines] if lines or share else []
 
 
 def _shape(answer: Answer, where: Attribution) -> str:
@@ -378,6 +395,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     """Caveats, findings on the data, and the share of the samples that is compared."""
     # The headline has wrong channels where nothing was searched.
     told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
+    if isinstance(result, Diagnosis) and unrelated_outputs(result):
+        told |= {UNRELATED}
     findings = finding_texts([f for f in result.sanity if f.code not in told])
     caveats = [caveat_text(code) for code in result.caveats if code not in told]
     quiet = [band for band in result.removed if all_shares and not band.above_noise]

@@ -51,6 +51,7 @@ _WORDS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"\b(\d+(?:\.\d+)?) (µ|m|)rad\b", r"\1 \2m"),
         (r"(?<=\[)rad\b", "m"),
         (r"\brad/s\b", "m/s"),
+        (r"\bwithin a motor turn\b", "within a short distance"),
     )
 )
 _PERIODS = re.compile(r"(\d+) periods? per (?:motor|drum) turn")

@@ -30,7 +30,7 @@ from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
 from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.axes import reading
-from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
+from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, period_of
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.runs.run import Run
@@ -44,7 +44,6 @@ _BINS = (20, 100)
 300 px."""
 _DIGITS = 5
 _TIME_DIGITS = 7
-_TURN = 2 * np.pi
 
 Indices = NDArray[np.intp]
 
@@ -193,11 +192,11 @@ class OutputCurves:
         kept: Indices,
     ) -> tuple[dict[str, Any], list[list[float | None]]]:
         """A variable at the kept samples and at the bins, and the means of the lines there."""
-        values = self.variables[variable]
-        values = values if order is None else np.mod(values, _TURN)
-        how = reading(variable, within_turn=order is not None)
         pattern = Attribution(self.output, variable, 0.0, order)
-        edges = bin_edges(values[compared], pattern, _TURN, _bins(len(compared)))
+        period, values = period_of(pattern), self.variables[variable]
+        values = values if period is None else np.mod(values, period)
+        how = reading(variable, within_turn=period is not None)
+        edges = bin_edges(values[compared], pattern, period, _bins(len(compared)))
         centres, means = bin_means(values[compared], [line[compared] for line in lines], edges)
         return {
             "variable": variable,

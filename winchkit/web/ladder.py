@@ -26,6 +26,8 @@ from winchkit.report.words.steps import (
     alike,
     doubt_texts,
     has_other_law,
+    reported,
+    reported_steps,
     step_text,
     step_title,
 )
@@ -69,7 +71,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
                 "text": capital(step_text(step)),
                 "doubts": [capital(text) for text in doubt_texts(step, diagnosis.data)],
             }
-            for step in diagnosis.steps
+            for step in reported(diagnosis).steps
         ],
         "changes": changes_text(diagnosis),
         "patterns": [title for title, _ in patterns_of(diagnosis)],
@@ -85,9 +87,9 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
 def patterns_of(diagnosis: Diagnosis) -> list[tuple[str, int | Attribution]]:
     """Titles of the open laws, each with the index of its step, and of the remaining patterns."""
     found: list[tuple[str, int | Attribution]] = [
-        (capital(step_title(step)), index)
-        for index, step in enumerate(diagnosis.steps)
-        if has_other_law(step) and not step.refitted
+        (capital(step_title(diagnosis.steps[index])), index)
+        for index in reported_steps(diagnosis)
+        if has_other_law(diagnosis.steps[index]) and not diagnosis.steps[index].refitted
     ]
     if not found and diagnosis.verdict in {"partly", "unknown", "undecided"}:
         places = [w for w in remaining_patterns(diagnosis) if w.frequency is None]
@@ -120,8 +122,9 @@ def ladder(
     """
     diagnosis = answer.diagnosis
     today = {name: out.heldout_rms_before for name, out in diagnosis.outputs.items()}
-    named = [effect for step in diagnosis.steps[:1] for effect in step.effects]
-    same = {effect for step in diagnosis.steps[:1] for effect in alike(step)}
+    steps = reported(diagnosis).steps
+    named = [effect for step in steps[:1] for effect in step.effects]
+    same = {effect for step in steps[:1] for effect in alike(step)}
     equal = {*named[:1], *same} if same else set()
     scores = [c for c in useful_candidates(diagnosis) if c.heldout_rms]
     known = {c.effect: c for c in diagnosis.candidates if c.heldout_rms}
@@ -145,7 +148,7 @@ def ladder(
     # The errors of a candidate are those of its screening. Of the one effect that the sentence
     # names they are those of the sentence, of the final fit with its own weights.
     fitted: dict[str, Mapping[str, float]] = {}
-    if len(diagnosis.steps) == 1 and named:
+    if len(steps) == 1 and named:
         after = {name: out.heldout_rms_after for name, out in diagnosis.outputs.items()}
         fitted[named[0]] = after
     for item in shown:
@@ -224,7 +227,7 @@ def _focus(diagnosis: Diagnosis) -> str:
 
     changed = {
         name
-        for step in diagnosis.steps[:1]
+        for _ in reported_steps(diagnosis)[:1]
         for name, out in diagnosis.outputs.items()
         if out.heldout_rms_after < (1 - _CHANGE) * out.heldout_rms_before
     }

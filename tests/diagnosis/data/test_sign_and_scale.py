@@ -300,3 +300,23 @@ def test_an_angle_in_another_unit_is_refused_as_such(factor: float, words: str) 
     with pytest.raises(RunError, match="wrong factor or unit of") as refused:
         validate_runs([scaled(made(3), "motor_angle", factor)], GROOVED)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_values_without_relation_to_the_motion_have_no_factor(seed: int) -> None:
+    """A uniform tension of 150 N in the mean: three times 5 kg, one and a half times 10 kg."""
+    random = np.random.default_rng(seed)
+    runs = [
+        with_channel(run, "tension", random.uniform(0.0, 300.0, len(run)))
+        for mass in (5.0, 10.0)
+        for run in (made(seed, load_mass=mass), made(seed + 9, load_mass=mass))
+    ]
+    assert codes(runs) == []
+    assert codes(runs[:2]) == []
+
+
+def test_runs_without_a_wrong_factor_beside_wrong_ones_have_a_slope_near_one() -> None:
+    whole = [made(seed) for seed in range(4)]
+    wrong = [scaled(run, "tension", 3.14) for run in whole[:2]]
+    assert codes([*wrong, *whole[2:]]) == [("tension", "wrong-factor")] * 2
+    assert codes([*wrong, *(scaled(run, "tension", 1.5) for run in whole[2:])]) == []

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
-from diagnosis_runs import recorded
+from diagnosis_runs import GROOVED, Ride, made, recorded, with_channel
 from winchkit.catalog import find
+from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, ranked
 from winchkit.diagnosis.search import selection_engine
@@ -84,3 +86,23 @@ def test_two_variables_at_once_must_explain_clearly_more(
     found: Sequence[Told], kept: Sequence[str]
 ) -> None:
     assert [item.variable for item in ranked(found)] == kept
+
+
+def test_drag_in_proportion_to_the_load_follows_load_and_direction_not_the_time() -> None:
+    """Three loads of which every run repeats one motion: the time has the direction in it."""
+    runs = []
+    for mass in (5.0, 15.0, 40.0):
+        run = made(int(mass), load_mass=mass, ride=Ride(samples=1200))
+        rate = np.gradient(run["motor_angle"], run.time)
+        runs.append(with_channel(run, "tension", run["tension"] * (1.0 + 0.05 * np.sign(rate))))
+    followed = compare(runs, GROOVED).outputs["tension"].follows
+    shares = dict(followed)
+    assert followed[0][0] == "directed_load"
+    assert shares["directed_load"] > shares["direction"] + 0.2, "the load is in it"
+    assert "time" not in shares
+
+
+def test_what_follows_nothing_but_the_time_is_attributed_to_it() -> None:
+    run = made(1, ride=Ride(samples=1200))
+    drift = with_channel(run, "tension", run["tension"] + 0.2 * run.time)
+    assert compare([drift], GROOVED).outputs["tension"].follows[0][0] == "time"

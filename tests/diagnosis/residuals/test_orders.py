@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis_runs import GROOVED, Ride, length_problem
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, strongest_harmonic
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.residuals.attribution import harmonics
 
@@ -64,3 +64,15 @@ def test_noise_has_an_order_in_one_of_a_hundred_cases() -> None:
         regression = length_problem([1e-3 * random.standard_normal(400)], short)
         found += bool(harmonics(regression, regression.residual(Hypothesis())))
     assert found <= 10, "0.02 is expected, 0.05 has a probability below 0.01"
+
+
+@pytest.mark.parametrize("turns", [0.7, 1.5, 1.9, 3.2])
+def test_fewer_than_two_whole_periods_are_none(turns: float) -> None:
+    """A cubic bend over the motion resembles a sine of one period; an order of three has three."""
+    angle = np.linspace(0.0, 2 * np.pi * turns, 2000)
+    across = np.linspace(-1.0, 1.0, 2000)
+    found = strongest_harmonic(angle, across**3 - 0.6 * across, 40)
+    assert found is None or found[0] * turns >= 1.99
+    third = strongest_harmonic(angle, np.sin(3 * angle), 40)
+    assert third is not None
+    assert third[0] == 3

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
+from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel, without
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.diagnosis.verdict.decision import verdict_of as decided
 from winchkit.effects.term import Term
+from winchkit.report.text import report_text
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import EffectTable
 
@@ -208,3 +209,32 @@ def test_candidates_are_ranked_and_the_first_ones_fitted() -> None:
         found.outputs["motor_torque"].heldout_rms_after, rel=0.05
     )
     assert found.candidates[-1].heldout_rms == {}
+
+
+def test_repeats_that_differ_by_as_much_as_the_output_varies_are_unknown() -> None:
+    """The noise is known, and nothing else is there: to repeat once more decides nothing."""
+    outputs = {"tension": output(1.0, 1.0)}
+    assert told(outputs, steps=0, deciding=set(), refuted={"tension"}) == "unknown"
+    assert (
+        told(outputs, steps=0, deciding=set(), refuted={"tension"}, noise_known=False)
+        == "undecided"
+    )
+
+
+def test_a_random_torque_does_not_follow_the_motion() -> None:
+    random = np.random.default_rng(5)
+    runs = [
+        with_channel(
+            without(run, "tension", "cable_length"),
+            "motor_torque",
+            0.5 * random.standard_normal(len(run)),
+            "N m",
+        )
+        for run in (made(seed, load_mass=10.0) for seed in range(4))
+    ]
+    answer = diagnose(runs, GROOVED)
+    assert answer.diagnosis.verdict == "unknown"
+    text = " ".join(report_text(answer).split())
+    assert "The motor torque does not follow the motion. Repeats of the same motion differ" in text
+    assert "record the same motion again" not in text
+    assert "Check the instrument of the motor torque" in text

@@ -52,7 +52,9 @@ def test_an_undetermined_value_is_not_judged() -> None:
 
 def test_a_shape_that_the_fit_held_at_an_end_of_its_range_is_implausible() -> None:
     """Dahl friction over a whole turn is a spring, and Coulomb friction near zero."""
-    assert "within a motor turn" in str(reason("motor-dahl", "distance", 6.3, std=nan))
+    found = str(reason("motor-dahl", "distance", 6.3, std=nan))
+    assert "within a motor turn" in found
+    assert "the law is probably another one" in found, "a wrong sign or unit changes no distance"
     assert reason("motor-dahl", "distance", 1e-6, std=nan) is None
 
 

@@ -18,11 +18,13 @@ from report_answers import (
 )
 from winchkit.diagnosis.results import Attribution, Estimate, NextRun, Step
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.fit_statistics import FitStatistics, FittedParameter
 from winchkit.report.words.sentence import (
     changes_text,
     headline,
     main_patterns,
     remaining_patterns,
+    remaining_text,
     sentence,
     where_text,
 )
@@ -224,3 +226,49 @@ def test_an_error_that_remains_above_the_noise_is_reported() -> None:
     )
     assert text.endswith("Still above the noise: motor torque by a factor of 5.4.")
     assert "Still above" not in sentence(diagnosis_of("explained", ELASTIC))
+
+
+def test_an_output_that_does_not_follow_the_motion_is_named() -> None:
+    lost = Finding("unrelated", "", "tension", float("nan"), "")
+    diagnosis = diagnosis_of("unknown", outputs={"tension": AT_NOISE}, sanity=(lost,))
+    assert sentence(diagnosis) == (
+        "The tension does not follow the motion. Repeats of the same motion differ by 0.742 N rms, "
+        "as much as it varies."
+    )
+    assert changes_text(diagnosis).startswith("Check the instrument of the tension")
+    both = {"tension": AT_NOISE, "cable_length": NOISY}
+    beside = diagnosis_of("unknown", outputs=both, sanity=(lost,), unexplained_share=1.0)
+    assert "100 % of the error above the noise remains" in sentence(beside), "of the length"
+
+
+def test_what_refitted_values_take_is_reported_where_no_step_does() -> None:
+    values = [
+        FittedParameter("motor-coulomb.torque", 0.02240, 3.6e-4, "N m", 0.020, (0.0216, 0.0231)),
+        FittedParameter("rotor-inertia.inertia", 1.21e-4, 3e-6, "kg m^2", 1.2e-4, (1.1e-4, 1.3e-4)),
+        FittedParameter("length offset", 1e-3, 1e-6, "m", 0.0, (0.9e-3, 1.1e-3)),
+    ]
+    fit = FitStatistics((), 1.0, parameters=tuple(values))
+    diagnosis = diagnosis_of("unknown", unexplained_share=0.81, fit=fit)
+    assert remaining_text(diagnosis) == (
+        "81 % of the error above the noise remains; refitted values of the profile take 19 %: "
+        "motor-coulomb torque 22.4 mN m instead of 20.0 mN m."
+    )
+    assert "take" not in remaining_text(replace(diagnosis, unexplained_share=0.999))
+    assert "take" not in remaining_text(replace(diagnosis, steps=(ELASTIC,)))
+
+
+def test_an_order_of_a_bend_does_not_precede_the_bend() -> None:
+    """A cubic spring over half a metre has a fifth of its variance in a sine of a quarter."""
+    wave, bend = (
+        Attribution("force", "position", 0.22, order=25),
+        Attribution("force", "position", 0.8),
+    )
+    assert main_patterns([bend, wave]) == [bend]
+    assert main_patterns([replace(bend, share=0.4), wave]) == [wave]
+
+
+def test_steps_beside_an_output_that_does_not_follow_the_motion_do_not_hide_it() -> None:
+    lost = Finding("unrelated", "", "tension", float("nan"), "")
+    assert headline(diagnosis_of("unknown", ELASTIC, sanity=(lost,))) == (
+        "The tension does not follow the motion"
+    )

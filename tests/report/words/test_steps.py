@@ -7,13 +7,16 @@ from math import radians
 
 import pytest
 
-from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED
+from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED, diagnosis_of
 from winchkit.diagnosis.results import Doubt, Estimate, Step
+from winchkit.report.text import step_lines
+from winchkit.report.words.sentence import headline
 from winchkit.report.words.steps import (
     alike,
     cause,
     doubt_texts,
     lowered_most,
+    reported_steps,
     step_text,
     step_title,
 )
@@ -110,3 +113,53 @@ def test_a_geometry_is_one_step_without_values() -> None:
     whole = Step(("exit-point", "anchor-point"), values, 0.9, whole=True)
     assert step_text(whole) == "the geometry of the robot differs as a whole"
     assert alike(whole) == {}
+
+
+def _friction_refitted(torque: float, std: float, share: float) -> Step:
+    """A refit of a Coulomb friction of 20 mN m, whose reversal is rounded in the runs."""
+    values = {
+        "torque": Estimate(torque, std, "N m"),
+        "transition": Estimate(0.199, 0.010, "rad/s"),
+    }
+    old = {"torque": 0.020, "transition": 0.0}
+    name = "motor-coulomb"
+    return Step((name,), {name: values}, 0.5, share=share, refitted=True, file_values=old)
+
+
+def test_steps_are_reported_in_the_order_of_what_they_explain() -> None:
+    small, large = replace(FRICTION, share=0.2), replace(ELASTIC, share=0.7)
+    diagnosis = diagnosis_of("explained", small, large)
+    assert reported_steps(diagnosis) == [1, 0]
+    assert [step["share"] for step in diagnosis.to_json()["steps"]] == [0.2, 0.7], (
+        "the JSON has the order in which the model grew"
+    )
+    assert "\n".join(step_lines(diagnosis)).index("elastic") < 40
+    assert headline(diagnosis).startswith("2 effects are missing; first, the cable is elastic")
+
+
+def test_a_refit_that_agrees_with_the_file_and_explains_nothing_is_not_reported() -> None:
+    same = _friction_refitted(0.019996, 0.000077, 0.0005)
+    diagnosis = diagnosis_of("explained", same, replace(ELASTIC, share=0.98))
+    assert headline(diagnosis) == "The cable is elastic"
+    assert len(step_lines(diagnosis)) == 1 + (len(step_lines(diagnosis)[0]) > 76)
+    assert len(diagnosis.to_json()["steps"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("torque", "share"), [(0.0207, 0.0005), (0.019996, 0.02), (0.019996, float("nan"))]
+)
+def test_a_refit_that_differs_or_explains_something_is_reported(
+    torque: float, share: float
+) -> None:
+    step = _friction_refitted(torque, 0.000077, share)
+    diagnosis = diagnosis_of("explained", step, replace(ELASTIC, share=0.98))
+    assert sorted(reported_steps(diagnosis)) == [0, 1]
+    assert headline(diagnosis).endswith("; 1 effect of the profile has other values")
+
+
+def test_a_refit_alone_is_reported_where_it_makes_the_verdict() -> None:
+    same = _friction_refitted(0.019996, 0.000077, 0.0005)
+    assert reported_steps(diagnosis_of("explained", same)) == [0]
+    unknown = diagnosis_of("unknown", same)
+    assert reported_steps(unknown) == []
+    assert headline(unknown).startswith("No known effect explains")

@@ -137,7 +137,12 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     if column := _mending(diagnosis):
         suggest_next("import", runs, "--column", column, "-o", "corrected")
         return
-    first = next(iter(diagnosis.steps), None)
+    from winchkit.report.words.sentence import unrelated_outputs
+    from winchkit.report.words.steps import reported
+
+    if unrelated_outputs(diagnosis):
+        return
+    first = next(iter(reported(diagnosis).steps), None)
     words = ("-p", asked.profile, *asked.options)
     if first is not None and len(first.effects) == 1:
         from winchkit.profile_edit.naming import extended_name

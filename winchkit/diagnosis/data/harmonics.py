@@ -16,6 +16,10 @@ _MOST_ORDERS = 1000
 _CELLS = 32
 """Cells per shortest period in which samples are summed to find the order; phase error of at most
 π/32, loss of power below 0.4 %; the share of the order found is exact."""
+_PERIODS = 2
+"""Whole periods that the motion must hold for an order: of fewer, any bend is a sine."""
+_ENDS = 0.01
+"""Part of these periods that may be missing at the ends of the motion; rule of thumb."""
 _LARGEST_CONDITION = 1e6
 """Condition of sine and cosine from which an order is not identifiable; numerical: half of the
 digits are left."""
@@ -57,10 +61,11 @@ def sums_by_order(
 
 
 def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, float] | None:
-    """The order from 1 to ``orders`` whose sine explains most of a residual, and its share.
+    """The order up to ``orders`` whose sine explains most of a residual, and its share.
 
-    ``angle``, ``error`` (n,): angle, rad, and what is explained. ``orders``: highest order.
-    Returns: None where there is no residual, or no order is identifiable: the angle hardly moves.
+    ``angle``, ``error`` (n,): angle, rad, and what is explained. ``orders``: highest order; the
+    lowest is that of which the motion holds two whole periods. Returns: None where there is no
+    residual, or no order is identifiable: the angle hardly moves.
 
     Notes
     -----
@@ -73,12 +78,20 @@ def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, fl
         sums_by_order(angle, values, orders, 2 * orders) for values in (error, np.ones(len(error)))
     )
     explained = _explained(toward[:orders], sums[1::2], len(angle))
+    explained[: _lowest_order(angle) - 1] = 0.0
     best = int(np.argmax(explained))
     if explained[best] <= 0.0:
         return None
     first = np.exp(1j * (best + 1) * angle)
     exact = _explained(np.array([first @ error]), np.array([np.sum(first**2)]), len(angle))
     return best + 1, float(exact[0]) / total
+
+
+def _lowest_order(angle: Array) -> int:
+    """Lowest order of which the range of an angle, rad, holds two whole periods."""
+    travel = float(np.ptp(angle))
+    most = 2 * _MOST_ORDERS
+    return most if travel <= 0.0 else int(min(np.ceil((_PERIODS - _ENDS) * _TURN / travel), most))
 
 
 def _explained(toward: NDArray[np.complex128], twice: NDArray[np.complex128], count: int) -> Array:

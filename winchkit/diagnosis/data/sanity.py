@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,9 @@ from winchkit.schema.profiles.winch import WinchProfile
 ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 """Codes of findings with which effects of a winch are not looked for."""
 
+UNRELATED = "unrelated"
+"""Code of an output that does not follow the motion: repeats differ by as much as it varies."""
+
 
 def findings(
     inspected: Sequence[Inspection], profile: WinchProfile, catalogue: Catalogue | None = None
@@ -34,6 +37,14 @@ def findings(
 def caveats(found: Sequence[Finding]) -> tuple[str, ...]:
     """Codes of the findings with which no effect is named, each once."""
     return tuple(dict.fromkeys(f.code for f in found if f.code in ALARMING))
+
+
+def unrelated(outputs: Collection[str]) -> tuple[Finding, ...]:
+    """Findings on outputs whose repeats differ by as much as they vary."""
+    text = (
+        "repeats of the same motion differ by as much as it varies: it does not follow the motion"
+    )
+    return tuple(Finding(UNRELATED, "", name, float("nan"), text) for name in outputs)
 
 
 def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:

@@ -54,6 +54,13 @@ _EQUAL = 1.1
 runs, where a factor may be wrong in others; effects change a slope by less than 10 %."""
 _LEAST_SAMPLES = 50
 """Samples with which a slope is fitted; as in `data/validation.py`."""
+_LEAST_EXPLAINED = 0.8
+"""Share of the measured square that the fit of a wrong factor explains at least: random values from
+zero to a limit have three quarters by their mean alone, whatever is predicted; runs in a wrong unit
+nine tenths and more."""
+_NONE = 1.34
+"""Slope, or its reciprocal, up to which a run counts as one without a wrong factor, where others
+have one: the root of `_LARGEST`, nearer to one than to any factor."""
 _LARGEST_INFLATION = 10.0
 """Variance inflation of the prediction by friction and inertia above which its slope is not judged;
 the textbook limit of a column that others explain to nine tenths (Marquardt 1970)."""
@@ -212,20 +219,26 @@ def _knows_load(run: Run) -> bool:
 
 
 def _reciprocal(slope: Slope) -> Slope:
-    return Slope(1 / slope.value, slope.std / slope.value**2)
+    return Slope(1 / slope.value, slope.std / slope.value**2, slope.explained)
 
 
 def _is_wrong(slope: Slope) -> bool:
-    """Whether a slope is negative or outside the range of effects, beyond its uncertainty."""
+    """Whether a slope is negative or outside the range of effects, beyond its uncertainty.
+
+    A factor also explains what was measured: values without any relation to the prediction have a
+    slope by their mean.
+    """
     low, high = abs(slope.value) - _SIGMAS * slope.std, abs(slope.value) + _SIGMAS * slope.std
-    return slope.value < 0 or low > _LARGEST or high < 1 / _LARGEST
+    is_factor = slope.explained >= _LEAST_EXPLAINED and (low > _LARGEST or high < 1 / _LARGEST)
+    return slope.value < 0 or is_factor
 
 
 def _differ(slopes: Sequence[Slope]) -> bool:
     """Whether the slopes that are not wrong differ from run to run, or the units of the others.
 
     A channel has one unit in all runs: two units are none, but an effect that is missing. They
-    are two where the slopes differ beyond their uncertainty.
+    are two where the slopes differ beyond their uncertainty. Runs that are not wrong beside wrong
+    ones have a slope near one.
     """
     wrong = sorted((s for s in slopes if _is_wrong(s)), key=lambda slope: abs(slope.value))
     units = {known for slope in wrong if (known := named_factor(slope))}
@@ -235,6 +248,8 @@ def _differ(slopes: Sequence[Slope]) -> bool:
         if excess > _SIGMAS * float(np.hypot(high.std, low.std)):
             return True
     sizes = [slope.value for slope in slopes if not _is_wrong(slope)]
+    if wrong and any(not 1 / _NONE < size < _NONE for size in sizes):
+        return True
     return len(sizes) > 1 and max(sizes) > _EQUAL * min(sizes)
 
 
@@ -260,7 +275,9 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
     without = _jackknifed(x, y)[:, 0] / scale
     # The coefficient of what the other columns leave of the first (Frisch, Waugh).
     value = float(own @ y) / float(own @ own) / scale
-    slope = Slope(value, _jackknife_std(without))
+    left = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+    explained = 1.0 - float(left @ left) / max(float(y @ y), 1e-300)
+    slope = Slope(value, _jackknife_std(without), explained)
     return slope if abs(slope.value) > _SIGMAS * slope.std else None
 
 

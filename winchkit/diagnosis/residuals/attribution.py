@@ -10,7 +10,7 @@ Pearson, K. (1905). On the general theory of skew correlation and non-linear reg
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -30,8 +30,12 @@ _LEVEL = 0.01
 """Probability that independent residuals have an order; convention, as the score's."""
 _OF_THE_CABLE = "cable_length", "directed_length"
 """Variables of a cable, which an axis lacks."""
+_WHERE_MEASURED = "load", "tension", "directed_load", "directed_tension", "temperature"
+"""Variables of runs that have the channel, or a known load."""
 LEAST_SHARE = 0.02
 """Least share of the variance that is reported."""
+_TIME = "time"
+"""Variable that is no cause."""
 LEAST_TEMPERATURE_RANGE = 1.0
 """Range below which the temperature counts as constant, K: noise of the thermometer."""
 MOST_PLACES = 6
@@ -74,7 +78,7 @@ _S = TypeVar("_S", bound=_HasShare)
 
 def variables_of(recording: Recording) -> dict[str, Array]:
     """Variables that may explain a residual along one run, (n,) each."""
-    known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
+    known = [name for name in VARIABLES if name not in _WHERE_MEASURED]
     profile = recording.raw.at.profile
     if isinstance(profile, AxisProfile):
         known = ["motor_angle", *(n for n in known if n not in {"motor_angle", *_OF_THE_CABLE})]
@@ -82,19 +86,25 @@ def variables_of(recording: Recording) -> dict[str, Array]:
         known.remove("drum_angle")
     out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
-        out["load"] = VARIABLES["load"](recording.smooth.at)
+        out |= _smooth(recording, "load", "directed_load")
     elif recording.raw.drum_tension is not None:
-        out["tension"] = VARIABLES["tension"](recording.smooth.at)
+        out |= _smooth(recording, "tension", "directed_tension")
     if recording.signals.temperature is not None:
-        out["temperature"] = VARIABLES["temperature"](recording.smooth.at)
+        out |= _smooth(recording, "temperature")
     return out
+
+
+def _smooth(recording: Recording, *names: str) -> dict[str, Array]:
+    """Variables with the noise of an instrument, from its smoothed signal."""
+    return {name: VARIABLES[name](recording.smooth.at) for name in names}
 
 
 def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output the variables that explain its residual, largest share first.
 
     ``residual`` (rows,). Returns: those whose share exceeds 2 % and three standard deviations of
-    its null distribution; of several names of one variable the first.
+    its null distribution; of several names of one variable the first. The time, over which every
+    motion that all runs have in common repeats, only where no other variable explains as much.
     """
     out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
@@ -115,7 +125,8 @@ def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attr
             share = binned_share(values, error, kept)
             if share > chance_share(BINS, kept):
                 found.append(Attribution(output, name, share))
-        out += ranked(found)
+        most = max((item.share for item in found if item.variable != _TIME), default=0.0)
+        out += ranked([item for item in found if item.variable != _TIME or item.share > most])
     return out
 
 
@@ -125,7 +136,7 @@ def _are_one(bins: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
     return bool(np.ptp(bins) > 0 and same > _SAME_BINS)
 
 
-def ranked(found: Iterable[_S]) -> list[_S]:
+def ranked(found: Sequence[_S]) -> list[_S]:
     """Largest share first; products of two variables only where they explain clearly more."""
     shares = {item.variable: item.share for item in found}
 
@@ -139,9 +150,9 @@ def ranked(found: Iterable[_S]) -> list[_S]:
 def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output and angle the order whose sine explains most of the residual variance.
 
-    ``residual`` (rows,). Returns: orders 1 to half the samples per turn, largest share first. The
-    share is above 2 %, and above what the largest of all orders explains of independent residuals
-    in 1 % of cases.
+    ``residual`` (rows,). Returns: orders up to half the samples per turn of which the motion holds
+    two whole periods, largest share first. The share is above 2 %, and above what the largest of
+    all orders explains of independent residuals in 1 % of cases.
     """
     times = regression.in_time(residual)
     out = []

@@ -74,7 +74,8 @@ def verdict_of(
     if steps and share <= MOSTLY:
         return "partly"
     above = not all(map(is_at_noise, outputs.values()))
-    return "unknown" if (noise_known and deciding) or (above and predictable()) else "undecided"
+    decided = noise_known and (deciding or refuted)
+    return "unknown" if decided or (above and predictable()) else "undecided"
 
 
 def is_at_noise(output: OutputFit) -> bool:

@@ -19,6 +19,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 _ROUNDING = 1e-6
 """Distance from a bound, in typical sizes, that counts as at the bound; numerical."""
 _CHECK = "check sign, unit, torque constant, gravity"
+_OTHER_LAW = "the law is probably another one; look at the residual without it"
 
 
 def implausible(
@@ -54,7 +55,8 @@ def implausible_value(
     known = plausible_range(parameter, profile)
     judged = parameter.role == "shape" or isfinite(estimate.std)
     if known is not None and judged and _is_held(estimate.value, known[:2], parameter):
-        return f"{shown} is at the end of the plausible range ({known[2]}): {_CHECK}"
+        advice = _OTHER_LAW if parameter.role == "shape" else _CHECK
+        return f"{shown} is at the end of the plausible range ({known[2]}): {advice}"
     if not isfinite(estimate.std):
         return None
     if known is None:

@@ -128,16 +128,22 @@ _WITH_A_SIGN = {
         "direction", "", categories=((-1.0, "paying out"), (0.0, "at rest"), (1.0, "winding in"))
     ),
     "directed_length": AxisLabel("free length, winding in; negative: paying out", "m"),
+    "directed_load": AxisLabel("load, winding in; negative: paying out", "N"),
+    "directed_tension": AxisLabel("tension, winding in; negative: paying out", "N"),
 }
 
 
 def reading(variable: str, *, within_turn: bool = False) -> AxisLabel:
-    """Unit and name of a variable; an angle within its turn in degrees, else in turns."""
+    """Unit and name of a variable; an angle within its turn in degrees, else in turns.
+
+    ``within_turn``: also whether a position is drawn within its period.
+    """
     name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
-    if variable in ANGLES and within_turn:
-        return AxisLabel(f"{name} within its turn", "°", _TURN / _DEGREES)
     if variable in ANGLES:
-        return AxisLabel(name, "turns", _TURN)
+        within = AxisLabel(f"{name} within its turn", "°", _TURN / _DEGREES)
+        return within if within_turn else AxisLabel(name, "turns", _TURN)
+    if variable == "position" and within_turn:
+        return AxisLabel(f"{name} within its period", "mm", 1e-3)
     if variable == "reversal_distance":
         return AxisLabel(name, "m", logarithmic=True)
     if variable in _WITH_A_SIGN:

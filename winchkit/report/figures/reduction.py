@@ -91,7 +91,7 @@ class ResidualCurve:
 
     over: Attribution
     x: Array
-    """Mean of the variable in every bin, (bins,); an angle with an order within its turn, rad."""
+    """Mean of the variable in every bin, (bins,); with an order within :func:`period_of`."""
     mean: Array
     """Measured less predicted, (bins,)."""
 
@@ -133,20 +133,30 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attributio
             x.append(variables_of(recording)[rotary_name(over.variable)][good])
             error.append(time[good])
     values = np.concatenate(x)
-    if is_within_turn(over):
-        values = np.mod(values, 2 * np.pi)
-    edges = bin_edges(values, over, 2 * np.pi)
+    if (period := period_of(over)) is not None:
+        values = np.mod(values, period)
+    edges = bin_edges(values, over, period)
     centres, (mean,) = bin_means(values, [np.concatenate(error)], edges)
     return ResidualCurve(over, centres, mean)
 
 
-def is_within_turn(over: Attribution) -> bool:
-    """Whether a residual is drawn over an angle within its turn; a position has no turn."""
-    return over.order is not None and over.variable in ANGLES
+def period_of(over: Attribution) -> float | None:
+    """Range within which a residual with an order is drawn: rad, of a position m.
+
+    Returns: one turn of an angle; one period of a position, which has no turn; None without an
+    order.
+    """
+    if over.order is None:
+        return None
+    return 2 * np.pi if over.variable in ANGLES else 2 * np.pi / over.order
 
 
-def bin_edges(values: Array, over: Attribution, turn: float, bins: int = _BINS) -> Array:
-    """Inner edges: equal within a turn, fine enough for the order; else ``bins`` equally filled."""
-    if over.order is None or not is_within_turn(over):
+def bin_edges(values: Array, over: Attribution, period: float | None, bins: int = _BINS) -> Array:
+    """Inner edges: equal within a period, fine enough for an order; else ``bins`` equally filled.
+
+    ``period``: that of :func:`period_of` in the unit of the values; None without one.
+    """
+    if over.order is None or period is None:
         return filled_edges(values, bins)
-    return np.linspace(0, turn, max(_BINS, _PER_PERIOD * over.order) + 1)[1:-1]
+    periods = over.order if over.variable in ANGLES else 1
+    return np.linspace(0, period, max(_BINS, _PER_PERIOD * periods) + 1)[1:-1]

@@ -32,7 +32,7 @@ from winchkit.report.figures.reduction import (
     bin_edges,
     bin_means,
     decimated,
-    is_within_turn,
+    period_of,
     strongest,
 )
 from winchkit.report.words.sentence import capital, often_per_turn
@@ -56,8 +56,6 @@ _SAME = 1e-3
 """Relative: two errors that differ by less are drawn as one."""
 _SPREAD = 0.2
 """Of the distance between two places: points of equal value are drawn beside each other."""
-_DEGREES = 360.0
-_TURN = 2 * np.pi
 _COMMON = pattern(r"^(?:motion[-_ ])?programme[-_ ]")
 
 
@@ -278,16 +276,17 @@ def _over_variable(
     values = np.concatenate(
         [variables_of(recordings[run])[rotary_name(followed.variable)] for run in curves.runs]
     )
-    within = is_within_turn(followed)
-    how = reading(followed.variable, within_turn=within)
-    variable = how.shown(np.mod(values, _TURN) if within else values)
+    period = period_of(followed)
+    how = reading(followed.variable, within_turn=period is not None)
+    variable = how.shown(values if period is None else np.mod(values, period))
+    shown = None if period is None else float(how.shown(period))
     states = [
         (tone, name, np.concatenate(parts) / curves.scale.worth)
         for tone, name, parts in curves.states
     ]
     good = np.isfinite(variable) & np.isfinite([values for _, _, values in states]).all(axis=0)
     x, states = variable[good], [(t, n, values[good]) for t, n, values in states]
-    centres, means = _means(x, [v for _, _, v in states], bin_edges(x, followed, _DEGREES))
+    centres, means = _means(x, [v for _, _, v in states], bin_edges(x, followed, shown))
     lines = [
         FigureSeries(f"mean, {name}" if len(states) > 1 else "mean", tone, centres, mean, "mean")
         for (tone, name, _), mean in zip(states, means, strict=True)
@@ -296,7 +295,7 @@ def _over_variable(
     samples: tuple[FigureSeries, ...] = ()
     cells = None
     name = "residual" if len(states) == 1 else f"residual, {states[0][1]}"
-    limits = (0.0, _DEGREES) if within else None
+    limits = None if shown is None else (0.0, shown)
     if len(x) <= _DOTS:
         spread = _spread(x) if followed.variable == "direction" else x
         samples = (FigureSeries(name, "today", spread, first, "dots"),)

@@ -7,7 +7,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Step
-from winchkit.effects.empirical import empirical_id
+from winchkit.effects.empirical import shown_id
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import reading
@@ -95,7 +95,7 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
         f"law-{step.effects[0]}",
         capital(f"{output} over {variable}, and the closest law"),
         f"Mean residual without {step.effects[0]}, and what this law explains of it; 'winchkit add "
-        f"{empirical_id(over.output, over.variable)}' adds the curve.",
+        f"{shown_id(over.output, over.variable)}' adds the curve.",
         how.axis(),
         (Panel(FigureAxis("residual", scale.label, zero=True), drawn),),
         source=source,

@@ -13,6 +13,7 @@ from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.text import addition_text, compare_text, error_lines, head_lines, step_lines
 from winchkit.report.words.columns import aligned, hanging, joined, paragraph
 from winchkit.report.words.sentence import changes_text, remaining_text
+from winchkit.report.words.steps import reported_steps
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def diagnosis_screen(diagnosis: Diagnosis) -> str:
         step_lines(diagnosis),
         error_lines(
             diagnosis.outputs,
-            extended=bool(diagnosis.steps),
+            extended=bool(reported_steps(diagnosis)),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),

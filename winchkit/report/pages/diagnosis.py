@@ -25,6 +25,7 @@ from winchkit.report.words.sentence import (
     remaining_text,
     where_text,
 )
+from winchkit.report.words.steps import reported, reported_steps
 from winchkit.report.words.vocabulary import VERDICT_NAMES, listed
 
 
@@ -97,7 +98,10 @@ def _verdict(answer: Answer, command: CommandLine, title: str, ladder: Figure | 
         ("Error", error_text(diagnosis)),
         ("Remains", remaining_text(diagnosis)),
         ("Detectable", shown),
-        ("Cure" if diagnosis.steps else "Next", _cure(diagnosis, command) if known else ""),
+        (
+            "Cure" if reported_steps(diagnosis) else "Next",
+            _cure(diagnosis, command) if known else "",
+        ),
         ("Then", changes_text(diagnosis) if known else ""),
     ]
     return lead(
@@ -191,7 +195,7 @@ def _commands(diagnosis: Diagnosis, command: CommandLine) -> list[str]:
     """Commands that reproduce the result and continue from it."""
     profile = command.profile
     commands = [command.compare(profile), command.diagnose(profile)]
-    for step in diagnosis.steps:
+    for step in reported(diagnosis).steps:
         if step.refitted:
             continue
         better = extended_name(profile, "calibrated" if step.whole else step.effects[0])

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isnan, pi
 
-from winchkit.diagnosis.data.sanity import ALARMING
+from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause
+from winchkit.report.words.steps import cause, reported
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, clause, listed
 
 _MOVED = 1.05
@@ -21,6 +21,10 @@ CLEAR_ORDER = 0.2
 """Least share of the residual variance from which an order within a turn precedes a trend."""
 _ABOVE = 1.5
 """Ratio of error to noise from which a sentence says that an output is above its noise."""
+_TAKEN = 0.005
+"""Share of the excess from which the text names its cause: half of the last digit of per cent."""
+_MOST_VALUES = 3
+"""Refitted values that are named."""
 _NO_GAIN = "No held-out error changes."
 _CHANGES = {
     "runs": ("other loads, strokes, speeds or temperatures", "another load, stroke or speed"),
@@ -36,7 +40,7 @@ _CONSTANT = ("winch", "pose")
 def headline(diagnosis: Diagnosis) -> str:
     """The result in one line: ``The drum has runout``; without a full stop."""
     worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
-    verdict, steps = diagnosis.verdict, diagnosis.steps
+    verdict, steps = diagnosis.verdict, reported(diagnosis).steps
     if diagnosis.interrupted:
         return "The search was interrupted before a verdict"
     if wrong_channels(diagnosis):
@@ -47,9 +51,18 @@ def headline(diagnosis: Diagnosis) -> str:
         what = f"The {worst} error" if not steps else f"What remains of the {worst} error"
         return f"{what} may be noise: these runs cannot decide"
     if verdict == "unknown":
-        what = "No known effect explains" if not steps else "Known effects explain little of"
-        return f"{what} the {worst} error"
+        return _unknown_text(diagnosis, worst)
     return capital(cause(steps)) if steps else f"The {worst} error is explained in part"
+
+
+def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
+    """Headline where known effects explain little, or nothing."""
+    if lost := unrelated_outputs(diagnosis):
+        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        return f"The {names} {'does' if len(lost) == 1 else 'do'} not follow the motion"
+    if reported(diagnosis).steps:
+        return f"Known effects explain little of the {worst} error"
+    return f"No known effect explains the {worst} error"
 
 
 def sentence(diagnosis: Diagnosis) -> str:
@@ -60,26 +73,60 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 def error_text(diagnosis: Diagnosis) -> str:
     """Sentence on the held-out error that falls most with the steps, without any on the worst."""
-    outputs = diagnosis.outputs
+    outputs, steps = diagnosis.outputs, reported(diagnosis).steps
     if diagnosis.interrupted:
         return ""
     if wrong := wrong_channels(diagnosis):
         return f"{'; '.join(wrong)}."
-    if not diagnosis.steps:
+    if lost := unrelated_outputs(diagnosis):
+        return _lost_text(outputs, lost)
+    if not steps:
         name = next(iter(worst_outputs(outputs)), "")
         if not name:
             return ""
         is_named = OUTPUT_NAMES.get(name, name) in headline(diagnosis)
         subject = "It" if is_named else f"The {OUTPUT_NAMES.get(name, name)} error"
         return f"{subject} is {size_texts(outputs)[name]}."
-    first, *others = diagnosis.steps
+    first, *others = steps
     either = len(first.effects) > 1 and not first.whole
     opening = "With them" if others else "With either" if either else "With it"
     if not others and all(is_wrong_value(effect) for effect in first.effects):
         opening = "With either corrected" if either else "Corrected"
-    if all(step.refitted for step in diagnosis.steps):
+    if all(step.refitted for step in steps):
         opening = "Corrected"
     return gain_text(outputs, opening, most=1) or _NO_GAIN
+
+
+def unrelated_outputs(diagnosis: Diagnosis) -> list[str]:
+    """Outputs that do not follow the motion, under the verdict ``unknown``; empty without any."""
+    if diagnosis.verdict != "unknown":
+        return []
+    named = [finding.channel for finding in diagnosis.sanity if finding.code == UNRELATED]
+    return [name for name in named if name in diagnosis.outputs]
+
+
+def _lost_text(outputs: Mapping[str, OutputFit], lost: Sequence[str]) -> str:
+    """``Repeats of the same motion differ by 0.135 N m rms, as much as it varies.``"""
+    sizes = [quantity(outputs[name].noise_rms or 0.0, outputs[name].unit) for name in lost]
+    varies = "it varies" if len(lost) == 1 else "they vary"
+    return f"Repeats of the same motion differ by {listed(sizes)} rms, as much as {varies}."
+
+
+def _refit_text(diagnosis: Diagnosis) -> str:
+    """What lowers the error where no step does: other values of the profile, all together."""
+    taken = 1.0 - diagnosis.unexplained_share
+    if reported(diagnosis).steps or diagnosis.fit is None or not taken >= _TAKEN:
+        return ""
+    changed = []
+    for one in diagnosis.fit.parameters:
+        low, high = one.interval or (one.value - 2 * one.std, one.value + 2 * one.std)
+        if "." in one.name and not low <= one.initial <= high:
+            scale = scale_for((one.value, one.initial), one.unit)
+            name, parameter = one.name.split(".", 1)
+            new, old = scale.text(one.value), scale.text(one.initial)
+            changed.append(f"{name} {parameter.replace('_', ' ')} {new} instead of {old}")
+    values = f": {', '.join(changed[:_MOST_VALUES])}" if changed else ""
+    return f"; refitted values of the profile take {percent(taken)}{values}"
 
 
 def is_wrong_value(effect: str) -> bool:
@@ -93,10 +140,13 @@ def remaining_text(diagnosis: Diagnosis) -> str:
         return ""
     if diagnosis.verdict == "explained":
         return still_text(diagnosis.outputs)
+    lost = unrelated_outputs(diagnosis)
+    if lost and all(_at_noise(o) for name, o in diagnosis.outputs.items() if name not in lost):
+        return ""
     share, parts = percent(diagnosis.unexplained_share), []
     if diagnosis.verdict != "undecided":
-        parts.append(f"{share} of the error above the noise remains.")
-    elif diagnosis.steps:
+        parts.append(f"{share} of the error above the noise remains{_refit_text(diagnosis)}.")
+    elif reported(diagnosis).steps:
         parts.append(f"At most {share} of the error above the noise remains.")
     if places := [where_text(where) for where in remaining_patterns(diagnosis)[:2]]:
         parts.append(f"Main pattern{'s' if len(places) > 1 else ''}: {'; '.join(places)}.")
@@ -108,6 +158,12 @@ def changes_text(diagnosis: Diagnosis) -> str:
     other, beyond = _CHANGES[diagnosis.data]
     if wrong_channels(diagnosis):
         return "Correct the channel by an import, or confirm that it is right."
+    if lost := unrelated_outputs(diagnosis):
+        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        return (
+            f"Check the instrument of the {names}, its wiring and its column in the file: no "
+            "effect of the motion explains what differs between repeats."
+        )
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."
     if diagnosis.next_runs:
@@ -119,7 +175,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
             f"To check: record {beyond}. If the new model misses it by more than the noise, this "
             "result is wrong."
         )
-    rest = "the rest" if diagnosis.steps else "it"
+    rest = "the rest" if reported(diagnosis).steps else "it"
     return (
         f"To explain {rest}: write an effect of your own, or record a run that isolates its cause."
     )
@@ -161,12 +217,17 @@ def often_per_turn(angle: str, order: int) -> str:
 def main_patterns(places: Sequence[Attribution]) -> list[Attribution]:
     """The most specific attribution of each output, the most specific output first.
 
-    A clear order within a turn precedes a trend, and a trend a constant of a robot's line.
+    A clear order within a turn precedes a trend, unless that explains more than twice as much: a
+    bend has a part of every order. A trend precedes a constant of a robot's line.
     """
+    trends: dict[str, float] = {}
+    for place in places:
+        if place.order is None and place.frequency is None:
+            trends[place.output] = max(place.share, trends.get(place.output, 0.0))
     ranked = sorted(
         places,
         key=lambda w: (
-            w.order is None or w.share < CLEAR_ORDER,
+            w.order is None or w.share < max(CLEAR_ORDER, trends.get(w.output, 0.0) / 2),
             w.variable in _CONSTANT,
             w.frequency is not None,
         ),

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import degrees, isfinite
+from dataclasses import replace
+from math import degrees, inf, isfinite
+from typing import TypeVar
 
-from winchkit.diagnosis.results import OutputFit, Step
+from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step
+from winchkit.effects.transition import TRANSITION
 from winchkit.quantity_text import percent, scale_for, significant, with_std
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
@@ -25,6 +28,49 @@ _LEAST = 1e-3
 _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
+_NEGLIGIBLE = 0.01
+"""Share of the excess below which a refitted value that agrees with the file's is not reported."""
+_NORMAL_95 = 1.96
+"""Standard deviations on each side of a 95 % interval, where none was computed."""
+_D = TypeVar("_D", bound=Diagnosis)
+
+
+def reported_steps(diagnosis: Diagnosis) -> list[int]:
+    """Indices of the steps that are reported, the largest share first; robots' without one before.
+
+    A refitted effect of the profile that explains less than a hundredth, and whose values agree
+    with those of the file, is left out unless it alone makes the verdict.
+    """
+    steps = diagnosis.steps
+    ranked = sorted(range(len(steps)), key=lambda i: -_rank(steps[i]))
+    told = [i for i in ranked if not _is_negligible(steps[i])]
+    return ranked if not told and diagnosis.verdict in {"explained", "partly"} else told
+
+
+def reported(diagnosis: _D) -> _D:
+    """A diagnosis with the steps that are reported, in their order; the JSON has all of them."""
+    chosen = tuple(diagnosis.steps[index] for index in reported_steps(diagnosis))
+    return diagnosis if chosen == diagnosis.steps else replace(diagnosis, steps=chosen)
+
+
+def _rank(step: Step) -> float:
+    return step.share if isfinite(step.share) else inf
+
+
+def _is_negligible(step: Step) -> bool:
+    """Whether a step is a refit that changes next to nothing; its transition is a nuisance."""
+    if not step.refitted or not step.share < _NEGLIGIBLE:
+        return False
+    values = step.parameters.get(step.effects[0], {})
+    sizes = {n: e for n, e in values.items() if n in step.file_values and n != TRANSITION}
+    return all(_agrees(estimate, step.file_values[name]) for name, estimate in sizes.items())
+
+
+def _agrees(estimate: Estimate, file_value: float) -> bool:
+    """Whether the 95 % interval of a value holds that of the file."""
+    half = _NORMAL_95 * estimate.std
+    low, high = estimate.interval or (estimate.value - half, estimate.value + half)
+    return low <= file_value <= high
 
 
 def cause(steps: Sequence[Step]) -> str:

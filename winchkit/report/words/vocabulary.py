@@ -33,6 +33,8 @@ VARIABLE_NAMES = {
     "direction": "direction",
     "cable_length": "free length",
     "directed_length": "free length and direction",
+    "directed_load": "load and direction",
+    "directed_tension": "tension and direction",
     "load": "load",
     "tension": "tension",
     "temperature": "temperature",

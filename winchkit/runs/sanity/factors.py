@@ -57,6 +57,8 @@ class Slope:
 
     value: float
     std: float
+    explained: float = 1.0
+    """Share of the measured square that the fit of the slope explains."""
 
 
 def named_factor(slope: Slope, *, is_angle: bool = False) -> str:
