@@ -14,13 +14,13 @@ from itertools import product
 import numpy as np
 
 from winchkit.arguments import require_sequence, require_type, require_types
-from winchkit.array_arguments import real_numbers
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation.groups import PulleyGroup, flat_pulleys
 from winchkit.estimation.kernels import PLAIN, Kernels
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
+from winchkit.runs.channel_values import real_numbers
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 

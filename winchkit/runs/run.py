@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.array_arguments import is_real, real_numbers
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.rendering import Plotted
+from winchkit.runs.channel_values import is_real, real_numbers
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse
 

@@ -176,8 +176,10 @@ def test_friction_of_runs_in_one_direction_each_determines_the_sign(sign: float)
     for index, speed in enumerate((0.2, 0.5, 1.0, 2.0, -0.2, -0.5, -1.0, -2.0)):
         time = np.arange(600) / 100
         torque = np.full(600, 0.5 * np.sign(speed) + 0.2 * speed) + random.normal(0, 0.05, 600)
-        run = replace(made(0, load_mass=None), time=time, metadata={"load_mass": "0 kg"})
-        run = with_channel(replace(run, channels={}), "motor_angle", speed * time, "rad")
+        run = replace(
+            made(0, load_mass=None), time=time, channels={}, metadata={"load_mass": "0 kg"}
+        )
+        run = with_channel(run, "motor_angle", speed * time, "rad")
         run = with_channel(run, "motor_torque", sign * torque, "N m")
         runs.append(replace(run, name=f"rung-{index}"))
     found = sign_and_scale(runs, GROOVED)

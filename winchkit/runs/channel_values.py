@@ -1,4 +1,4 @@
-"""Arrays of real numbers of what a caller passes as one; beside ``arguments``, without numpy."""
+"""Values of a channel from what a caller passes as such: lists, masked arrays, columns of tables."""
 
 from __future__ import annotations
 
