@@ -1,4 +1,4 @@
-"""Values of a channel from what a caller passes as such: lists, masked arrays, columns of tables."""
+"""Values of a channel from what a caller passes: lists, masked arrays, columns of tables."""
 
 from __future__ import annotations
 
