@@ -59,4 +59,4 @@ def test_an_error_of_the_cell_is_in_one_set_with_that_of_the_torque(
     found = step.parameters[effect][parameter]
     assert found.value == pytest.approx(true, abs=4 * found.std)
     assert found.std < 0.1 * abs(true)
-    assert all(output == "motor_torque" for _, output, _ in step.place)
+    assert {place.output for place in step.place} == {"motor_torque"}
