@@ -64,7 +64,13 @@ LENGTH_GAIN = Effect(
     formula="(1 + g) ℓ, beside the offset of the instrument",
     source="sensitivity of a measuring system (JCGM 200:2012, 4.12)",
     looks_like="A length error in proportion to the length; none in torque and tension.",
-    confused_with=("drum-radius", "gear-ratio", "cable-elongation-linear"),
+    confused_with=(
+        "drum-radius",
+        "gear-ratio",
+        "layer-thickness",
+        "guide-offset",
+        "cable-elongation-linear",
+    ),
     told_apart="The torque under a known load, which a wrong radius or ratio changes too; a tape "
     "measure.",
     needs=("cable",),
