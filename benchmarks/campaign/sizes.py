@@ -42,7 +42,7 @@ OUTSIDE = (
 )  # fmt: skip
 RECENT = (
     "load-lever", "cell-crosstalk", "cell-clipping", "friction-growth", "friction-at-place",
-    "drum-unbalance", "spring-balancer", "torque-ripple", "motor-dahl",
+    "drum-unbalance", "spring-balancer", "torque-ripple", "motor-dahl", "length-gain", "load-gain",
 )  # fmt: skip
 """Effects that the catalogue got after seeds were first drawn."""
 
@@ -65,6 +65,7 @@ def allowed(effect: str, winch: Winch, load_known: bool, warms: bool, loads: int
         "cell-thermal": warms and load_known,
         "outside-clipping": load_known,
         "load-lever": load_known,
+        "load-gain": load_known,
         "cell-crosstalk": load_known,
         "cell-clipping": load_known,
         "outside-joint": loads > 2,
@@ -131,6 +132,8 @@ _ONE = {
     "cable-thermal": ("expansion", 1.1e-5, True),
     "drum-winding-tension": ("fraction", 5e-3, False),
     "length-time-offset": ("delay", 0.02, False),
+    "length-gain": ("gain_error", 5e-3, True),
+    "load-gain": ("gain_error", 0.01, True),
     "pulley-coulomb": ("friction", 0.02, False),
     "pulley-viscous": ("viscosity", 10.0, False),
     "pulley-capstan": ("friction", 0.02, False),

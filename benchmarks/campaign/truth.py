@@ -32,6 +32,7 @@ class Situation:
     time: Array
     motor_angle: Array
     mass: float
+    """As the runs state it."""
     temperature: Array
     wander: Array
     """A slow curve of rms one, the same in every run."""
@@ -47,6 +48,7 @@ class Shown:
     tension: Array
     motor_torque: Array
     load: Array
+    """As the runs state it."""
 
 
 def show(winch: Winch, run: Situation, hidden: Hidden) -> Shown:
@@ -74,11 +76,12 @@ class _Line:
 
     def shown(self) -> Shown:
         free, arm = self._path()
-        load = self.run.mass * (G - np.gradient(np.gradient(free, self.time), self.time))
+        stated = self.run.mass * (G - np.gradient(np.gradient(free, self.time), self.time))
+        load = stated * (1 + (self.get("load-gain") or {}).get("gain_error", 0.0))
         drum_side = self._to_the_drum(load, free)
         length = self._rope(free, load)
         torque = self._torque(drum_side, arm, free)
-        ideal = length, self._cell(drum_side, torque), torque, load
+        ideal = length, self._cell(drum_side, torque), torque, stated
         return Shown(*(channel[:: self.run.every] for channel in ideal))
 
     def _turned(self, motor_angle: Array) -> Array:
@@ -149,6 +152,7 @@ class _Line:
         if p := self.get("outside-platform"):
             transient_mask = np.gradient(self.speed, self.time)
             length = length + p["step"] * np.tanh(lag(transient_mask, self.time, 0.5, 0.0) / 0.02)
+        length = length * (1 + (self.get("length-gain") or {}).get("gain_error", 0.0))
         if p := self.get("length-time-offset"):
             length = np.interp(self.time - p["delay"], self.time, length)
         return length

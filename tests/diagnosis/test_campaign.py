@@ -19,6 +19,8 @@ ONE = (
     ("length-time-offset", 204),
     ("cell-drift", 207),
     ("torque-constant", 208),
+    ("length-gain", 211),
+    ("load-gain", 212),
     pytest.param("layer-thickness", 201, marks=CAMPAIGN),
     pytest.param("drum-eccentricity", 202, marks=CAMPAIGN),
     pytest.param("pulley-coulomb", 205, marks=CAMPAIGN),

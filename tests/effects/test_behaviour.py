@@ -53,6 +53,8 @@ LINEAR = {
     "rotor-inertia",
     "joint-gravity",
     "drum-unbalance",
+    "length-gain",
+    "load-gain",
     "load-lever",
     "spring-balancer",
     "torque-ripple",

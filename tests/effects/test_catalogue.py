@@ -44,6 +44,8 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "drum-winding-tension": {"fraction": ("1", 0)},
     "frame-compliance": {"stiffness": ("N/m", inf)},
     "length-time-offset": {"delay": ("s", 0)},
+    "length-gain": {"gain_error": ("1", 0)},
+    "load-gain": {"gain_error": ("1", 0)},
     "pulley-coulomb": {"friction": ("1", 0), "transition": ("m/s", 0)},
     "pulley-viscous": {"viscosity": ("N s/m", 0)},
     "pulley-stribeck": {
@@ -156,7 +158,8 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
         "prediction-delay joint-gravity friction-of-load motor-coulomb",
         "spring-balancer stribeck-of-load rotor-inertia",
         "gear-efficiency motor-coulomb torque-constant torque-lag",
-        "cable-elongation-linear frame-compliance length-time-offset",
+        "cable-elongation-linear frame-compliance length-gain length-time-offset",
+        "load-gain cable-weight load-lever pulley-coulomb",
     ],
 )
 def test_effects_act_in_the_order_of_the_interface(chain: str) -> None:

@@ -312,6 +312,8 @@ CASES: dict[str, Case] = {
         {"amplitude": 0.02, "phase": -0.4},
         lambda: _torque(0.02 * np.cos(X.phi - 0.4 - pi / 2)),
     ),
+    "length-gain": ({"gain_error": 0.02}, lambda: {"cable_length": 1.02 * X.free}),
+    "load-gain": ({"gain_error": 0.02}, lambda: _tension(1.02 * X.T)),
     "load-lever": (
         {"amplitude": 0.05, "phase": 0.2},
         lambda: _tension(X.T * (1 + 0.05 * np.cos(X.phi + 0.2 - pi / 2))),

@@ -116,7 +116,7 @@ def test_a_measured_load_comes_before_a_known_mass() -> None:
     assert np.all(line.predict(motion)["tension"] == 55.0)
 
 
-def test_without_a_load_the_cell_stands_in_and_its_own_errors_cannot_be_seen() -> None:
+def test_without_a_load_the_cell_stands_in_and_nothing_before_it_can_be_seen() -> None:
     time, angle = swing()
     tension = 90 + 10 * np.cos(time)
     signals = Signals(time, angle, tension=tension)
@@ -129,7 +129,6 @@ def test_without_a_load_the_cell_stands_in_and_its_own_errors_cannot_be_seen() -
         bare.profile,
         {
             "pulley-coulomb": {"friction": 0.1},
-            "cell-gain": {"gain_error": 0.1},
             "cable-weight": {"mass_per_length": 0.2},
         },
     )
@@ -190,9 +189,13 @@ def test_modifiers_act_in_the_order_of_stages_then_of_their_own() -> None:
     line = Line(profile_with("grooved"), modifiers)
     time, angle = swing()
     line.predict(line.motion(Signals(time, angle, load=np.full_like(time, 1.0))))
+    load = [order for stage, order, _ in seen if stage is Stage.LOAD]
+    assert load == [0, 1, 2] * (len(load) // 3)
+    assert seen[0][0] is Stage.LOAD, "length, tension and torque follow from it"
+    seen = [item for item in seen if item[0] is not Stage.LOAD]
     stages = [stage for stage, _, _ in seen]
     assert stages == sorted(stages)
-    assert set(stages) == set(Stage) - ROBOT_STAGES
+    assert {Stage.LOAD, *stages} == set(Stage) - ROBOT_STAGES
     for before, after in pairwise(seen):
         if before[0] == after[0] and before[2] == after[2]:
             assert before[1] < after[1]

@@ -15,6 +15,7 @@ import numpy as np
 
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.requirements import with_inputs
 from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
 from winchkit.diagnosis.regression.cross_validation import CERTAIN, held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
@@ -66,9 +67,10 @@ def selection_engine(
     Candidates are all effects of winches, or those that are given.
     """
     regression = TimeSeriesRegression(dataset)
-    initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
+    known = catalogue.mapped(lambda effect: with_inputs(effect, dataset))
+    initial_model = initial_hypothesis(dataset.profile, known, regression)
     chosen = catalogue.of_winches() if candidates is None else candidates
-    absent = [located(effect, dataset.motions) for effect in chosen]
+    absent = [located(with_inputs(effect, dataset), dataset.motions) for effect in chosen]
     return TimeSeriesSelection(regression, initial_model, absent)
 
 

@@ -32,9 +32,9 @@ from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.open_law import OpenLaw
 from winchkit.diagnosis.verdict.plausibility import implausible
 
-_MOST_ALTERNATIVES = 3
-"""Members of a set, the simplest first; more are named in a doubt. Rule of thumb: what a reader can
-compare."""
+_MOST_ALTERNATIVES = 4
+"""Members of a set, the simplest first; more are named in a doubt. Radius, ratio and gain of the
+length instrument are three names of one change, beside which there may be another law."""
 _LARGEST_COLLINEARITY = 1e5
 """Law and channel are accurate to 0.3 % at best: where the others imitate an effect's change to
 within that, what distinguishes it is less than their error."""

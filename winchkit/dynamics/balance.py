@@ -35,8 +35,8 @@ _PIECES = 3
 """Newton steps for a torque that is piecewise linear in the acceleration, as friction by the load:
 one for each sign of the load and one to reach the right piece."""
 ON_MOTION = frozenset(
-    {Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND, Stage.CABLE_WEIGHT, Stage.PULLEY, Stage.GEARBOX}
-) | {Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL}
+    {Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND, Stage.LOAD, Stage.CABLE_WEIGHT, Stage.PULLEY}
+) | {Stage.GEARBOX, Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL}
 """Stages between the motor's torque and its motion; the others change readings only."""
 
 

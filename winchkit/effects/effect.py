@@ -19,7 +19,7 @@ from winchkit.model.stages import PARTS, ROBOT_STAGES, At, Stage
 Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
-    "axis", "ungeared", "whole_turns", "torque", "prediction",
+    "axis", "ungeared", "whole_turns", "torque", "prediction", "cell",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -36,6 +36,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",
     "prediction": "the torque that another model predicts (--predicted)",
+    "cell": "a load channel or load_mass, or a motor_torque that the tension predicts",
 }
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""
 Output = Literal["cable_length", "tension", "motor_torque"]
@@ -159,6 +160,9 @@ class Effect:
     undo: Callable[[Any, Any, Values], Any] | None = None
     """Signal before the stage from the signal after it and its times, (n,); for a delay or a filter
     of a reading, which changes no motion."""
+    correct: Callable[[Any, At, Values], Any] | None = None
+    """Value before the stage from the value after it, (n,), of an instrument whose reading is an
+    input where no other is known: what is predicted from the reading has its errors."""
     rested: float = 0.0
     """``start`` of a machine after a long rest under its load."""
     left_out: str = ""

@@ -41,6 +41,7 @@ def linear_effect(effect: Effect) -> Effect:
         if (law := effect.dynamics) is None
         else Dynamics(_with_names(law.value), _with_names(law.rate)),
         undo=None if effect.undo is None else _with_names(effect.undo),
+        correct=None if effect.correct is None else _with_names(effect.correct),
         impacts=None if effect.impacts is None else _with_names(effect.impacts),
         possible=None if effect.possible is None else _with_names(effect.possible),
         probes=tuple(

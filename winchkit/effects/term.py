@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from traceback import extract_tb
@@ -63,7 +63,19 @@ class Term:
     def modifier(self) -> Modifier:
         """The term as modifier of a line."""
         apply = partial(act, self.effect, self.values)
-        return Modifier(self.effect.stage, apply, self.effect.order)
+        undone = self.effect.correct
+        correct = None if undone is None else partial(_corrected, undone, self.values)
+        return Modifier(self.effect.stage, apply, self.effect.order, correct)
+
+
+def _corrected(
+    correct: Callable[[Any, At, Mapping[str, float]], Any],
+    values: Mapping[str, float],
+    value: Any,
+    at: At,
+) -> Any:
+    """The value before an effect from the value after it."""
+    return correct(value, at, values)
 
 
 def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:

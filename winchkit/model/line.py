@@ -71,6 +71,23 @@ class Line:
             value = modifier.apply(value, at)
         return value
 
+    def _force(self, force: Any, at: At) -> Any:
+        """Cable force from the one that the runs state or, where none is, from the cell's reading.
+
+        Effects of the cell are undone, the last first.
+        """
+        if not at.reads_cell:
+            return self._through(Stage.LOAD, force, at)
+        for modifier in reversed(self._stages.get(Stage.CELL, ())):
+            if modifier.correct is not None:
+                force = modifier.correct(force, at)
+        return force
+
+    def _under_force(self, at: At) -> At:
+        """Inputs with the corrected cable force."""
+        force = self._force(at.tension, at)
+        return at if force is at.tension else replace(at, tension=force)
+
     @cached_property
     def _drum(self) -> Drum:
         return drum_of(self.profile)
@@ -135,6 +152,7 @@ class Line:
             temperature=missing if signals.temperature is None else signals.temperature,
             motor_torque=zero if signals.motor_torque is None else signals.motor_torque,
             predicted_torque=signals.predicted_torque,
+            reads_cell=load is None and signals.tension is not None,
         )
         drum_tension = signals.tension if load is None else None
         return Motion(at, clock, load, drum_tension, mass, discretization, load_std=load_std)
@@ -152,6 +170,7 @@ class Line:
 
     def kinematics(self, at: At) -> WinchKinematics:
         """Drum angle, wound length and arm from the motor angle, by gearbox, drum and guide."""
+        at = self._under_force(at)
         turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
         wound_angle = self._reference_wound + turned.value
         at = replace(at, drum_angle=turned.value, wound_angle=wound_angle)
@@ -164,7 +183,7 @@ class Line:
     def indicated_length(self, at: At, kinematics: WinchKinematics) -> Array:
         """Reading of the length instrument, m."""
         at = replace(
-            at,
+            self._under_force(at),
             drum_angle=kinematics.drum_angle,
             wound_angle=self._reference_wound + kinematics.drum_angle,
             free_length=kinematics.free_length,
@@ -203,12 +222,14 @@ class Line:
         """Tension at the drum: from the load along the cable and over the pulleys, N."""
         at = motion.at
         if motion.load is None:
-            return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
+            reading = motion.drum_tension
+            return np.zeros_like(at.time) if reading is None else self._force(reading, at)
         return self.drum_tension(self._load(motion, kinematics), at)
 
     def drum_tension(self, load: Array, at: At) -> Array:
         """Tension at the drum from the tension at the platform, N."""
-        tension = self._through(Stage.CABLE_WEIGHT, load, at)
+        tension, at = self._force(load, at), self._under_force(at)
+        tension = self._through(Stage.CABLE_WEIGHT, tension, at)
         if Stage.PULLEY in self._stages:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
@@ -217,11 +238,11 @@ class Line:
 
     def indicated_tension(self, at: At, drum_side: Array) -> Array:
         """Reading of the load cell, N."""
-        return np.asanyarray(self._through(Stage.CELL, drum_side, at))
+        return np.asanyarray(self._through(Stage.CELL, drum_side, self._under_force(at)))
 
     def indicated_torque(self, at: At, kinematics: WinchKinematics, drum_side: Array) -> Array:
         """Reported torque by virtual work: cable force times derivative of wound length, N m."""
-        torque = drum_side * kinematics.arm
+        torque, at = drum_side * kinematics.arm, self._under_force(at)
         if at.predicted_torque is not None:
             torque = at.predicted_torque
         for stage in (Stage.GEARBOX, Stage.MOTOR, Stage.TORQUE_CONSTANT, Stage.TORQUE_SIGNAL):

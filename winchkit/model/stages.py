@@ -49,27 +49,29 @@ class Stage(IntEnum):
     """Value: length at the exit point, m."""
     LENGTH_INSTRUMENT = 6
     """Value: reading of the length instrument, m."""
-    CABLE_WEIGHT = 7
+    LOAD = 7
+    """Value: load, N, from that which the runs state: their column or ``load_mass``."""
+    CABLE_WEIGHT = 8
     """Value: tension at the last pulley, N."""
-    PULLEY = 8
+    PULLEY = 9
     """Value: tension after one pulley, N; once per pulley, ``At.wrap`` and ``At.pulley`` set."""
-    CELL = 9
+    CELL = 10
     """Value: reading of the load cell, N."""
-    GEARBOX = 10
+    GEARBOX = 11
     """Value: torque of the cable at the motor, N m."""
-    MOTOR = 11
+    MOTOR = 12
     """Value: torque with the motor's own terms, N m."""
-    TORQUE_CONSTANT = 12
+    TORQUE_CONSTANT = 13
     """Value: torque of the motor in the drive's units, N m."""
-    TORQUE_SIGNAL = 13
+    TORQUE_SIGNAL = 14
     """Value: torque reported by the drive, N m."""
-    LINE_PLACE = 14
+    LINE_PLACE = 15
     """Value: :class:`LinePlace` of a robot's line."""
-    HOME_LENGTH = 15
+    HOME_LENGTH = 16
     """Value: cable of a robot's line at home, m."""
-    PAYLOAD = 16
+    PAYLOAD = 17
     """Value: the :class:`~winchkit.schema.profiles.robot.PlatformSpec` of a robot."""
-    TRACKER = 17
+    TRACKER = 18
     """Value: :class:`~winchkit.robot.geometry.tracker.Tracker` of a robot's poses."""
 
 
@@ -84,6 +86,7 @@ PARTS = {
     Stage.CABLE: "cable",
     Stage.FRAME: "frame",
     Stage.LENGTH_INSTRUMENT: "length instrument",
+    Stage.LOAD: "load",
     Stage.CABLE_WEIGHT: "cable",
     Stage.PULLEY: "pulley",
     Stage.CELL: "cell",
@@ -177,6 +180,8 @@ class At:
     """The drive's reading, else zero, N m."""
     predicted_torque: Array | None = None
     """At the motor by another model, in place of the torque of the cable, N m."""
+    reads_cell: bool = False
+    """Whether ``tension`` is the cell's reading, since no load is known."""
     pulley: int = -1
     wrap: float = 0.0
 
@@ -193,3 +198,5 @@ class Modifier:
     stage: Stage
     apply: Callable[[Any, At], Any]
     order: int = 0
+    correct: Callable[[Any, At], Any] | None = None
+    """Value before the stage from the value after it, for an instrument that is an input."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.effects.effect import NEED_WORDS, Effect
+from winchkit.effects.effect import NEED_WORDS, Effect, Output
 from winchkit.model.stages import Stage
 from winchkit.schema.profiles.axis import AxisProfile
 
@@ -48,11 +49,26 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
         "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
+        "cell": any(r.raw.load is not None for r in recordings) or _tension_is_input(dataset),
     }
     lacking = [NEED_WORDS[need] for need in effect.needs if not have[need]]
     if not set(effect.outputs) & set(dataset.outputs):
         lacking.append("a measured " + " or ".join(effect.outputs))
     return lacking
+
+
+def _tension_is_input(dataset: Dataset) -> bool:
+    """Whether some torque is predicted from the reading of a load cell."""
+    return any(r.raw.at.reads_cell and "motor_torque" in r.measured for r in dataset.recordings)
+
+
+def with_inputs(effect: Effect, dataset: Dataset) -> Effect:
+    """The effect; of an instrument that is an input too, it changes what the reading predicts."""
+    if effect.correct is None or not _tension_is_input(dataset):
+        return effect
+    compared = [output for output in effect.outputs if output in dataset.outputs]
+    torque: Output = "motor_torque"
+    return replace(effect, outputs=tuple(dict.fromkeys((*compared, torque))))
 
 
 def _turns(dataset: Dataset) -> float:

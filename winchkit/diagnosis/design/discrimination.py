@@ -29,6 +29,8 @@ SEPARATED_AT = 3.841
 """95 % quantile of χ² with one degree of freedom."""
 _MOST_OFFERS = 2
 """Programmes that are offered per pair; rule of thumb."""
+_WEIGHED = ", with load_mass"
+"""Of a programme that is simulated with known loads where the runs have none."""
 LEAST_POWER = 0.2
 """Least power of a programme or of poses that are offered."""
 
@@ -68,11 +70,18 @@ def next_runs(
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
         useful = [offer for offer in offers if offer[1] >= LEAST_POWER][:_MOST_OFFERS]
-        out += [NextRun(names, name, power) for _, power, name in useful]
+        weighed = _WEIGHED if _is_of_an_input(regression, first, second) else ""
+        out += [NextRun(names, name + weighed, power) for _, power, name in useful]
         if not useful:
             # No motion separates them: the advice of the catalogue, whose power is not known.
             out.append(NextRun(names, told_apart(first.effect, second.effect), float("nan")))
     return tuple(out)
+
+
+def _is_of_an_input(regression: TimeSeriesRegression, first: Term, second: Term) -> bool:
+    """Whether one effect is of a cell whose reading stands for the load."""
+    unknown = all(recording.raw.load is None for recording in regression.dataset.recordings)
+    return unknown and any(term.effect.correct is not None for term in (first, second))
 
 
 def power_of(noncentrality: float, required: float = SEPARATED_AT) -> float:

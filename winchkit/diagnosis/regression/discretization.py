@@ -117,6 +117,7 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
         predicted_torque=None
         if smooth.at.predicted_torque is None
         else between(smooth.at.predicted_torque),
+        reads_cell=smooth.at.reads_cell,
     )
     load = None if smooth.load is None else at.tension
     drum_side = None if smooth.drum_tension is None else between(smooth.drum_tension)

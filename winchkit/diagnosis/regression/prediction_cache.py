@@ -43,15 +43,17 @@ class Predictor:
         self._recording = recording
         self._kept: dict[str, OrderedDict[Hashable, Any]] = {}
         # A measured load does not depend on the cable's path; a known weight's force does.
-        force = _FORCE if recording.smooth.load_mass is None else _KINEMATICS + _FORCE
+        moved = _FORCE if recording.smooth.load_mass is None else _KINEMATICS + _FORCE
+        source = (Stage.CELL if recording.smooth.at.reads_cell else Stage.LOAD,)
+        kinematics, force = source + _KINEMATICS, source + moved
         self._stages: dict[str, tuple[Stage, ...]] = {
             "motion": (),
             "nominal": (),
-            "kinematics": _KINEMATICS,
+            "kinematics": kinematics,
             "force": force,
-            "cable_length": _KINEMATICS + _INDICATED["cable_length"],
+            "cable_length": kinematics + _INDICATED["cable_length"],
             "tension": force + _INDICATED["tension"],
-            "motor_torque": _KINEMATICS + force + _INDICATED["motor_torque"],
+            "motor_torque": kinematics + force + _INDICATED["motor_torque"],
         }
 
     def outputs_of(self, stage: Stage) -> set[str]:

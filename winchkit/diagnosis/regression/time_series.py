@@ -210,8 +210,9 @@ class TimeSeriesRegression(Regression):
         return out
 
     def outputs_of(self, stage: Stage) -> set[str]:
-        """Outputs that a stage of the model acts on in at least one run."""
-        return {output for p in self._predictors for output in p.outputs_of(stage)}
+        """Measured outputs that a stage of the model acts on in at least one run."""
+        reached = {output for p in self._predictors for output in p.outputs_of(stage)}
+        return reached & set(self.outputs)
 
     def discretization_error(self, hypothesis: Hypothesis) -> Array:
         """Change of the prediction on a four times finer time grid, shape (n_rows,)."""

@@ -23,6 +23,7 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
+from winchkit.model.stages import Stage
 
 _STRONG = 0.9
 """Correlation above which parameters of an effect are reported as a combination; convention:
@@ -39,8 +40,9 @@ def combination_of_set(
     """Combination of parameters that the data determine, whichever member of a set is true.
 
     ``dataset``: None for a robot. Returns: the cable per motor turn, mean over the runs, for a
-    wrong radius or ratio. Otherwise the sum of all amplitudes, each over its fitted value, which is
-    one. None for a single effect, and where a member has more than one amplitude.
+    wrong radius or ratio; the indicated one where the length instrument may be wrong as well.
+    Otherwise the sum of all amplitudes, each over its fitted value, which is one. None for a single
+    effect, and where a member has more than one amplitude.
     """
     ids = {term.effect.id for term in terms}
     if len(ids) < 2:
@@ -49,7 +51,9 @@ def combination_of_set(
     if ids >= _WINDING and dataset is not None:
         known = next(i for i, term in enumerate(terms) if term.effect.id in _WINDING)
         (estimate,) = parameters[terms[known].effect.id].values()
-        return _cable_per_motor_turn(terms[known], estimate.std, dataset)
+        shown = any(term.effect.stage is Stage.LENGTH_INSTRUMENT for term in terms)
+        name = "indicated cable per motor turn" if shown else "cable per motor turn"
+        return _cable_per_motor_turn(name, terms[known], estimate.std, dataset)
     if any(parameter is None for parameter in sole):
         return None
     pairs = [
@@ -103,12 +107,12 @@ def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination 
     return Combination(formula, float(value), deviation, term.effect.parameter(names[0]).unit)
 
 
-def _cable_per_motor_turn(term: Term, std: float, dataset: Dataset) -> Combination:
+def _cable_per_motor_turn(label: str, term: Term, std: float, dataset: Dataset) -> Combination:
     """Mean change of the cable length per motor turn over these runs, with one of the members."""
     (name,) = Coordinates(term.effect).names
     moved = Term(term.effect, {**term.values, name: term.values[name] + std})
     value, beside = (_length_per_turn(each, dataset) for each in (term, moved))
-    return Combination("cable per motor turn", value, abs(beside - value), "m")
+    return Combination(label, value, abs(beside - value), "m")
 
 
 def _length_per_turn(term: Term, dataset: Dataset) -> float:

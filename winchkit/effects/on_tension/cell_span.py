@@ -13,6 +13,10 @@ def _cell_gain(tension: Array, at: At, values: Values) -> Array:
     return tension * (1.0 + values["gain_error"])
 
 
+def _cell_gain_corrected(reading: Array, at: At, values: Values) -> Array:
+    return reading / (1.0 + values["gain_error"])
+
+
 CELL_GAIN = Effect(
     id="cell-gain",
     stage=Stage.CELL,
@@ -32,16 +36,24 @@ CELL_GAIN = Effect(
         ),
     ),
     apply=_cell_gain,
+    correct=_cell_gain_corrected,
     outputs=("tension",),
     variable="load",
     what="The cell's span is wrong: calibration, mounting angle, a parallel load path.",
     formula="(1 + g) T",
     source="load-cell practice",
     looks_like="A tension error in proportion to the tension, equal in both directions.",
-    confused_with=("pulley-coulomb", "pulley-capstan", "cell-nonlinearity", "torque-constant"),
-    told_apart="Several loads in both directions; the torque distinguishes it from a wrong load.",
+    confused_with=(
+        "pulley-coulomb",
+        "pulley-capstan",
+        "cell-nonlinearity",
+        "torque-constant",
+        "load-gain",
+    ),
+    told_apart="Several known loads in both directions; the torque distinguishes it from a wrong "
+    "load.",
     family="cell static",
-    needs=("load",),
+    needs=("cell",),
     order=0,
     on_robot=frozenset({"one"}),
 )

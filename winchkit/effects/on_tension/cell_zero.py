@@ -11,20 +11,25 @@ def _cell_offset(tension: Array, at: At, values: Values) -> Array:
     return tension + values["offset"]
 
 
+def _cell_offset_corrected(reading: Array, at: At, values: Values) -> Array:
+    return reading - values["offset"]
+
+
 CELL_OFFSET = Effect(
     id="cell-offset",
     stage=Stage.CELL,
     parameters=(Parameter("offset", "N", null=0.0, typical=5.0, low=-1e6, high=1e6),),
     apply=_cell_offset,
+    correct=_cell_offset_corrected,
     outputs=("tension",),
     what="The cell was not tared, or its zero has moved.",
     formula="T + o",
     source="load-cell practice",
     looks_like="A constant tension error, at any load.",
-    confused_with=("cable-weight", "cell-drift", "cell-thermal"),
-    told_apart="Two loads and the full stroke; a tare without load.",
+    confused_with=("cable-weight", "cell-drift", "cell-thermal", "motor-coulomb-asymmetry"),
+    told_apart="Two known loads and the full stroke; a tare without load.",
     family="cell static",
-    needs=("load",),
+    needs=("cell",),
     order=1,
     on_robot=frozenset({"one"}),
 )

@@ -1,4 +1,4 @@
-"""Effects on the tension between load and pulleys: weight of the cable, lever of the load."""
+"""Effects on the tension before the pulleys: stated load, cable weight, lever of the load."""
 
 from __future__ import annotations
 
@@ -21,6 +21,42 @@ MASS_PER_LENGTH = Parameter(
     plausible=Plausible(0.0, 20.0, "a steel cable of 70 mm has 20 kg/m"),
 )
 """Of the cable."""
+
+
+def _load_gain(load: Array, at: At, values: Values) -> Array:
+    return load * (1.0 + values["gain_error"])
+
+
+LOAD_GAIN = Effect(
+    id="load-gain",
+    stage=Stage.LOAD,
+    parameters=(
+        Parameter(
+            "gain_error",
+            "1",
+            null=0.0,
+            typical=0.01,
+            low=-0.9,
+            high=10.0,
+            plausible=Plausible(
+                -0.5, 1.0, "a weight is per cent off; a factor of two is another weight, or a unit"
+            ),
+        ),
+    ),
+    apply=_load_gain,
+    outputs=("tension", "motor_torque"),
+    variable="load",
+    what="The load differs from the one that the runs state, by the same share in all of them.",
+    formula="(1 + g) F, F the column 'load', or the force of 'load_mass'",
+    source="conventional mass and its tolerance (OIML R 111); error of sensitivity of the cell at "
+    "the load",
+    looks_like="The same share of the load in tension and torque, in both directions.",
+    confused_with=("cell-gain", "torque-constant", "drum-radius"),
+    told_apart="Tension and torque together: each instrument's own gain changes one of them. "
+    "Otherwise weigh the load.",
+    needs=("cable", "load"),
+    left_out="it corrects the load that runs state; correct 'load_mass', or calibrate that cell",
+)
 
 
 def _cable_weight(tension: Array, at: At, values: Values) -> Array:

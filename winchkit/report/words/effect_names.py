@@ -95,6 +95,11 @@ EFFECTS: dict[str, tuple[str, str]] = {
     "guide-offset": ("offset of the cable guide", "the guide is mounted with an offset"),
     "joint-gravity": ("eccentric weight of the axis", "the axis carries an eccentric weight"),
     "layer-thickness": ("growth of the cable layers", "the growth of the cable layers is wrong"),
+    "length-gain": (
+        "gain of the length instrument",
+        "the length instrument has a gain error",
+    ),
+    "load-gain": ("stated load", "the load differs from the one that the runs state"),
     "length-time-offset": ("delay of the length instrument", "the length instrument is delayed"),
     "load-lever": ("lever of the load", "the load acts through a lever"),
     "motor-cogging": ("cogging of the motor", "the motor has cogging torque"),

@@ -1,0 +1,80 @@
+"""Errors of inputs: of the stated load, and of a cell whose reading is the only force known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from effect_lines import CATALOGUE, EFFECTS
+from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
+from winchkit.effects.term import Term, modifiers_of
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals, Stage
+
+TRUE = standard_motion().load
+assert TRUE is not None
+READINGS = {
+    "cell-gain": ({"gain_error": 0.04}, 1.04 * TRUE),
+    "cell-offset": ({"offset": 6.0}, TRUE + 6.0),
+}
+ELASTIC = Term(CATALOGUE["cable-elongation-linear"], {"axial_stiffness": 4e4})
+
+
+def predicted(terms: list[Term], **force: object) -> dict[str, np.ndarray]:
+    at, line = standard_motion().at, Line(STANDARD_PROFILE, modifiers_of(terms))
+    signals = Signals(at.time, at.motor_angle, temperature=at.temperature)
+    return line.predict(line.motion(replace(signals, **force)))
+
+
+def test_effects_that_are_undone_are_those_of_the_cell() -> None:
+    assert {e.id for e in EFFECTS if e.correct is not None} == set(READINGS)
+    assert all(CATALOGUE[name].stage is Stage.CELL for name in READINGS)
+
+
+@pytest.mark.parametrize("effect", READINGS)
+def test_torque_and_length_follow_from_the_tension_behind_a_wrong_reading(effect: str) -> None:
+    values, reading = READINGS[effect]
+    shown = predicted([ELASTIC, Term(CATALOGUE[effect], values)], tension=reading)
+    right = predicted([ELASTIC], tension=TRUE)
+    assert "tension" not in shown
+    assert (
+        np.max(np.abs(predicted([], tension=reading)["motor_torque"] - right["motor_torque"])) > 0
+    )
+    for output in ("motor_torque", "cable_length"):
+        assert np.allclose(shown[output], right[output], rtol=1e-12, atol=0)
+
+
+def test_gain_and_offset_of_a_cell_are_undone_the_last_first() -> None:
+    both = [Term(CATALOGUE[name], READINGS[name][0]) for name in READINGS]
+    shown = predicted(both, tension=1.04 * TRUE + 6.0)
+    assert np.allclose(shown["motor_torque"], predicted([], tension=TRUE)["motor_torque"])
+
+
+def test_under_a_known_load_a_wrong_cell_changes_its_reading_alone() -> None:
+    values, reading = READINGS["cell-gain"]
+    shown = predicted([ELASTIC, Term(CATALOGUE["cell-gain"], values)], load=TRUE, tension=TRUE)
+    right = predicted([ELASTIC], load=TRUE)
+    assert np.allclose(shown["tension"], reading)
+    assert np.array_equal(shown["motor_torque"], right["motor_torque"])
+    assert np.array_equal(shown["cable_length"], right["cable_length"])
+
+
+@pytest.mark.parametrize("stated", [{"load": TRUE / 1.05}, {"load_mass": 20.0 / 1.05}])
+def test_a_wrong_stated_load_pulls_the_cable_with_the_true_one(stated: dict[str, object]) -> None:
+    others = [ELASTIC, Term(CATALOGUE["pulley-coulomb"], {"friction": 0.02, "transition": 0.0})]
+    heavier = Term(CATALOGUE["load-gain"], {"gain_error": 0.05})
+    shown = predicted([*others, heavier], **stated)
+    true = {name: 1.05 * value for name, value in stated.items()}  # type: ignore[operator]
+    right = predicted(others, **true)
+    assert set(shown) == {"cable_length", "tension", "motor_torque"}
+    for output, values in right.items():
+        assert np.allclose(shown[output], values, rtol=1e-12, atol=1e-12), output
+
+
+def test_a_wrong_stated_load_changes_nothing_where_none_is_stated() -> None:
+    heavier = Term(CATALOGUE["load-gain"], {"gain_error": 0.05})
+    shown, right = (predicted(terms, tension=TRUE) for terms in ([ELASTIC, heavier], [ELASTIC]))
+    for output, values in right.items():
+        assert np.array_equal(shown[output], values)
