@@ -41,8 +41,8 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
         )
     if loads and all(r.raw.load is None for r in dataset.recordings):
         notes.append(
-            "no load known: pulley friction cannot be detected, and wrong gain or offset of the "
-            "cell not told from those of the torque; give load_mass or a second cell"
+            "no load known: pulley friction cannot be detected, nor a wrong gain or offset of the "
+            "cell distinguished from those of the torque; give load_mass or a second cell"
         )
     notes += _motions([r.raw.at.speed for r in dataset.recordings])
     temperatures = [r.signals.temperature for r in dataset.recordings]
