@@ -46,7 +46,7 @@ OPEN = replace(
     ELASTIC,
     law="open",
     place=(Place("cable", "cable_length", "load"),),
-    doubts=(Doubt("curve", "a free curve over load explains 30% more: the law is another one"),),
+    doubts=(Doubt("curve", "a free curve over load explains 30 % more: the law is another one"),),
     share=0.4,
 )
 FIVE_CORNERS = (

@@ -50,7 +50,7 @@ def with_compensations(
     if any(steps[place].refitted for place in torque):
         together = _Together.of(engine, result, file, [at[place] for place in torque])
         if together is not None and (factor := together.factor()) is not None:
-            what = f"a torque constant that is wrong by {factor - 1:+.1%}"
+            what = f"a torque constant that is wrong by {100 * (factor - 1):+.1f} %"
             for place in torque:
                 out[place] = _doubted(out[place], "factor", what, len(torque))
     return tuple(out)

@@ -32,6 +32,7 @@ from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import FittedCurve, PartialRegression, ranked_curves
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
 from winchkit.effects.term import Term
+from winchkit.quantity_text import percent
 
 MARGIN = 0.1
 """Share of what a step explains by which a curve must explain more; see docs/methods.md."""
@@ -90,8 +91,8 @@ def _beside(
         if curve.net_gain > 0.0 and share > MARGIN:
             return OpenLaw(
                 curve,
-                f"a curve over {curve.words} beside it explains {share:.0%} of what is left: the "
-                "law is another one, and its values contain a part of that",
+                f"a curve over {curve.words} beside it explains {percent(share)} of what is left: "
+                "the law is another one, and its values contain a part of that",
             )
     return None
 
@@ -134,8 +135,8 @@ def _better(
         return None
     return OpenLaw(
         found[best],
-        f"a free curve over {found[best].words} explains {gained / explained:.0%} more: the law "
-        "is another one",
+        f"a free curve over {found[best].words} explains {percent(gained / explained)} more: the "
+        "law is another one",
     )
 
 
