@@ -26,7 +26,7 @@ from winchkit.robot.identification.bundle_adjustment import Mask, solve
 from winchkit.robot.identification.equations import RobotEquations, started
 
 _EVIDENCE = 45.0
-"""Difference of criteria from which axes are named together: eight reversed ones give 90 to 160, and
+"""Difference of criteria from which axes are named: eight reversed ones give 90 to 160, and
 right ones were named at 10 to 20 (16 robots of a campaign), which is what a single reversed axis
 gives. Alone it cannot be distinguished from exit points, and does no harm."""
 
