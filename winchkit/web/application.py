@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from starlette.applications import Starlette
+from starlette.datastructures import QueryParams
 from starlette.middleware import Middleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -247,6 +248,8 @@ class _Drawings:
 
     async def _curve(self, request: Request) -> Response:
         query = request.query_params
+        if self._has_ended(query):
+            return JSONResponse(None)
         curves = self.workspace.curves(query.get("output", ""), beside="beside" in query)
         first, last = float(query.get("from", "-inf")), float(query.get("to", "inf"))
         points = min(_MOST_POINTS, int(query.get("points", "1600")))
@@ -254,10 +257,16 @@ class _Drawings:
 
     async def _multiples(self, request: Request) -> Response:
         query = request.query_params
+        if self._has_ended(query):
+            return JSONResponse(None)
         output, beside, wanted = query.get("output", ""), "beside" in query, query.getlist("over")
         curves = self.workspace.curves(output, beside=beside)
         known = self.workspace.side(beside).order_of(output)
         return JSONResponse(await asyncio.to_thread(curves.multiples, known, wanted))
+
+    def _has_ended(self, query: QueryParams) -> bool:
+        """Whether a side of a comparison is asked for that was ended meanwhile."""
+        return "beside" in query and self.workspace.state.beside is None
 
     async def _lines(self, request: Request) -> Response:
         query, used = request.query_params, self.workspace.state.used

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 import pytest
@@ -43,15 +44,16 @@ def test_the_plan_is_a_programme_that_distinguishes_them(fat: list[Path], tmp_pa
     before = answer("diagnose", *fat, "-p", "bench-spiral")
     (step,) = before["steps"]
     assert "drum-radius" in step["effects"]
-    assert len(step["effects"]) == 2
+    assert len(step["effects"]) > 1
     next_file = tmp_path / "next.toml"
     told = answer("plan", *fat, "-p", "bench-spiral", "-o", next_file)
     best = told["offers"][0]
-    assert [set(p["effects"]) for p in best["separates"]] == [set(step["effects"])]
-    assert best["separates"][0]["power"] > 0.9
-    assert best["minutes"] == min(
-        o["minutes"] for o in told["offers"] if o["separates"][0]["power"] > 0.9
-    )
+    assert {name for pair in best["separates"] for name in pair["effects"]} == set(step["effects"])
+
+    def separated(offer: dict[str, Any]) -> int:
+        return sum(pair["power"] >= 0.9 for pair in offer["separates"])
+
+    assert separated(best) == max(map(separated, told["offers"])) > 0
     programme = read_programme(next_file)
     assert programme.repeat == 1, "the runs so far have repeats"
     reached = [step.to for step in programme.step if step.to is not None]

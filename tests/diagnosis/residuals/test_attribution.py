@@ -57,12 +57,17 @@ def test_friction_at_one_place_is_located_by_place_and_direction() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("physics", "output"), [("sticky pulleys", "tension"), ("motor drag", "motor_torque")]
+    ("physics", "output", "variable"),
+    [
+        ("sticky pulleys", "tension", "directed_load"),
+        ("motor drag", "motor_torque", "direction"),
+    ],
 )
-def test_what_changes_with_the_direction_alone_is_attributed_to_it(
-    physics: str, output: str
+def test_what_changes_with_the_direction_is_attributed_to_it(
+    physics: str, output: str, variable: str
 ) -> None:
-    assert first_followed(physics)[output] == "direction"
+    """Friction of a pulley is in proportion to the load as well."""
+    assert first_followed(physics)[output] == variable
 
 
 def test_what_grows_with_the_length_is_not_attributed_to_direction_too() -> None:

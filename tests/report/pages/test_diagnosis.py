@@ -278,7 +278,7 @@ def test_story_truth_and_commands_are_reported() -> None:
 
 def test_several_effects_are_added_one_after_another() -> None:
     real = answer_of("demo-elastic-rope")
-    said = replace(real.diagnosis, steps=(*real.diagnosis.steps, FRICTION))
+    said = replace(real.diagnosis, steps=(*real.diagnosis.steps, replace(FRICTION, share=0.01)))
     text = Page(report_html(WinchAnswer(real.engine, real.result, said), "x", profile="p")).text
     assert "winchkit add cable-elongation-linear --profile p --fit" in text
     assert "winchkit add pulley-coulomb --profile p-cable-elongation-linear.toml --fit" in text

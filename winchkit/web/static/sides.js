@@ -63,14 +63,16 @@ function errors(view, output, focus) {
   return el("div", { class: "scroll" }, el("table", { class: "sides" }, el("thead", {}, el("tr", {}, ["Held-out error", "A", "noise floor A", "A ÷ floor", "B", "noise floor B", "B ÷ floor"].map((words, i) => el("th", { class: `${i ? "number" : ""} ${i % 3 === 2 ? "wide" : ""}` }, words)))), el("tbody", {}, rows)));
 }
 
-// A comparison that was ended meanwhile needs no answer.
-const besides = (boxes, action) => attempt(async () => { try { await action(); } catch (error) { if (boxes[0].isConnected) throw error; } });
-const answers = (view, path) => Promise.all(sidesOf(view).map((side, i) => ask(`${path}${i ? "&beside=1" : ""}`)));
+// A comparison that was ended meanwhile, whose other side is null, is not drawn.
+async function answers(view, path) {
+  const found = await Promise.all(sidesOf(view).map((side, i) => ask(`${path}${i ? "&beside=1" : ""}`)));
+  return found.includes(null) ? new Promise(() => {}) : found;
+}
 const ends = (values) => values.reduce(([low, high], value) => (value === null ? [low, high] : [Math.min(low, value), Math.max(high, value)]), [Infinity, -Infinity]);
 const wider = ([low, high]) => [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)];
 
 async function drawTimes(view, output, boxes) {
-  await besides(boxes, async () => {
+  await attempt(async () => {
     const width = Math.max(300, boxes[0].clientWidth - 32), part = span ? `&from=${span[0]}&to=${span[1]}` : "";
     const found = await answers(view, `/api/curve?output=${output}&points=${Math.round(2 * width)}${part}`);
     if (!boxes[0].isConnected) return;
@@ -94,7 +96,7 @@ async function drawTimes(view, output, boxes) {
 }
 
 async function drawOver(view, output, boxes) {
-  await besides(boxes, async () => {
+  await attempt(async () => {
     const most = await answers(view, `/api/multiples?output=${output}`);
     const shares = most.flatMap((own) => own.panels).sort((a, b) => b.share - a.share), names = [...new Set(shares.map((panel) => panel.variable))].slice(0, 3);
     const found = await answers(view, `/api/multiples?output=${output}${names.map((name) => `&over=${name}`).join("")}`);
