@@ -175,7 +175,7 @@ function header() {
 let logged = null;
 function recording(chip, log) {
   const time = log && `${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}`;
-  fill(chip, el("i", {}, "●"), log ? `${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "");
+  fill(chip, ...(log ? [el("i", {}, "●"), `${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}`] : []));
   chip.hidden = !log;
   if (logged && !log) {
     alarm(`Recorded: ${logged.path}, ${logged.rows ?? "no"} rows.`, "recorded");
