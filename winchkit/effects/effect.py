@@ -300,6 +300,11 @@ MOTOR_ORDERS = (*map(float, range(1, 13)), 18.0, 24.0, 36.0)
 runs in motion are scanned for every order."""
 
 
+def with_gain(signal: Any, at: At, values: Values) -> Any:
+    """A signal (n,) with the ``gain_error`` of its instrument; as ``apply`` of an effect."""
+    return signal * (1.0 + values["gain_error"])
+
+
 def order_per_turn(orders: tuple[float, ...], typical: float) -> Parameter:
     """The parameter ``order``, tested at ``orders``; a free order would fit any periodic error."""
     return Parameter(

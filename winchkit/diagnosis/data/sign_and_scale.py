@@ -56,8 +56,7 @@ _LEAST_SAMPLES = 50
 """Samples with which a slope is fitted; as in `data/validation.py`."""
 _LEAST_EXPLAINED = 0.8
 """Share of the measured square that the fit of a wrong factor explains at least: random values from
-zero to a limit have three quarters by their mean alone, whatever is predicted; runs in a wrong unit
-nine tenths and more."""
+zero to a limit have three quarters by their mean alone, whatever is predicted."""
 _NONE = 1.34
 """Slope, or its reciprocal, up to which a run counts as one without a wrong factor, where others
 have one: the root of `_LARGEST`, nearer to one than to any factor."""

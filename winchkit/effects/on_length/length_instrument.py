@@ -1,7 +1,7 @@
 """Effects of the length instrument: delay, gain."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
 from winchkit.model.derivatives import shifted
 from winchkit.model.stages import At, Stage
 
@@ -37,10 +37,6 @@ LENGTH_TIME_OFFSET = Effect(
 )
 
 
-def _length_gain(length: Array, at: At, values: Values) -> Array:
-    return length * (1.0 + values["gain_error"])
-
-
 LENGTH_GAIN = Effect(
     id="length-gain",
     stage=Stage.LENGTH_INSTRUMENT,
@@ -57,7 +53,7 @@ LENGTH_GAIN = Effect(
             ),
         ),
     ),
-    apply=_length_gain,
+    apply=with_gain,
     outputs=("cable_length",),
     variable="cable_length",
     what="The length instrument has a gain error: measuring wheel, counts per metre, scale.",

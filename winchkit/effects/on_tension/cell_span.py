@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
 from winchkit.model.stages import At, Stage
-
-
-def _cell_gain(tension: Array, at: At, values: Values) -> Array:
-    return tension * (1.0 + values["gain_error"])
 
 
 def _cell_gain_corrected(reading: Array, at: At, values: Values) -> Array:
@@ -35,7 +31,7 @@ CELL_GAIN = Effect(
             ),
         ),
     ),
-    apply=_cell_gain,
+    apply=with_gain,
     correct=_cell_gain_corrected,
     outputs=("tension",),
     variable="load",

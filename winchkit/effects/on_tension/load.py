@@ -7,7 +7,7 @@ from math import sin
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
 from winchkit.model.stages import At, Stage
 from winchkit.units import GRAVITY
 
@@ -21,10 +21,6 @@ MASS_PER_LENGTH = Parameter(
     plausible=Plausible(0.0, 20.0, "a steel cable of 70 mm has 20 kg/m"),
 )
 """Of the cable."""
-
-
-def _load_gain(load: Array, at: At, values: Values) -> Array:
-    return load * (1.0 + values["gain_error"])
 
 
 LOAD_GAIN = Effect(
@@ -43,7 +39,7 @@ LOAD_GAIN = Effect(
             ),
         ),
     ),
-    apply=_load_gain,
+    apply=with_gain,
     outputs=("tension", "motor_torque"),
     variable="load",
     what="The load differs from the one that the runs state, by the same share in all of them.",

@@ -12,15 +12,11 @@ from winchkit.effects.effect import (
     Plausible,
     Values,
     order_per_turn,
+    with_gain,
 )
 from winchkit.model.derivatives import shifted
 from winchkit.model.recurrence import first_order_lag
 from winchkit.model.stages import At, Stage
-
-
-def _torque_constant(torque: Array, at: At, values: Values) -> Array:
-    return torque * (1.0 + values["gain_error"])
-
 
 TORQUE_CONSTANT = Effect(
     id="torque-constant",
@@ -38,7 +34,7 @@ TORQUE_CONSTANT = Effect(
             ),
         ),
     ),
-    apply=_torque_constant,
+    apply=with_gain,
     outputs=("motor_torque",),
     variable="load",
     what="The drive's torque constant or rated torque is wrong, or the magnets are warm.",
