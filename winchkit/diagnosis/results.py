@@ -184,6 +184,8 @@ class Step:
     share: float = float("nan")
     """Share of the excess over the noise that only this step explains (leave-one-out)."""
     doubts: tuple[Doubt, ...] = ()
+    curve: str = ""
+    """Variable, in words, of a free curve that explains more than the law, where there is one."""
     refitted: bool = False
     """Whether it is an effect of the profile with another value than in the file."""
     file_values: Mapping[str, float] = field(default_factory=dict)
@@ -215,6 +217,7 @@ class Step:
             "certain": self.certain,
             "share": self.share,
             "doubts": [vars(doubt) for doubt in self.doubts],
+            "curve": self.curve or None,
             "refitted": self.refitted,
             "file_values": dict(self.file_values),
         }

@@ -35,6 +35,7 @@ from winchkit.diagnosis.selection.transitions import (
     with_fitted_transitions,
     with_rounded_reversals,
 )
+from winchkit.diagnosis.verdict.compensation import CurveInstead
 from winchkit.diagnosis.verdict.laws import degenerate_laws, simplified
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
@@ -126,20 +127,36 @@ def _with_transitions(
         transitions.update(scanned_transitions(engine, present, noise))
         return bool(transitions)
 
-    engine.on_trial, engine.on_step = trials, is_rounded
-    result = stepwise_selection(engine, known)
+    engine.on_trial = trials
+    result = _unless_imitated(engine, is_rounded, known)
     if not transitions:
         return result, None
     rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue.of_winches())
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial, again.delays_wait = trials, engine.delays_wait
-    again.on_step = lambda present, noise: is_enough(present)
-    found = stepwise_selection(again)
+    found = _unless_imitated(again, lambda present, noise: is_enough(present))
     if _has_more(found.final, result.final) and not predicts_better(
         (again, found.final, found.noise), (engine, result.final, result.noise)
     ):
         return result, None
     return found, (again, rounded)
+
+
+def _unless_imitated(
+    engine: TimeSeriesSelection,
+    is_enough: Callable[[Fit, BandNoise], bool],
+    known: Callable[[SelectionResult], None] = lambda first: None,
+) -> SelectionResult:
+    """Result of the selection; of effects that imitate one unknown law the closest."""
+    curve: list[CurveInstead] = []
+
+    def begin(first: SelectionResult) -> None:
+        curve.append(CurveInstead(engine, first.initial_model))
+        known(first)
+
+    engine.on_step = lambda present, noise: is_enough(present, noise) or curve[0](present, noise)
+    result = stepwise_selection(engine, begin)
+    return curve[0].closest(result)
 
 
 def _with_delays_last(

@@ -154,6 +154,7 @@ def with_standing(
         certain=established and standing.certain and not any(d.code in _SERIOUS for d in doubts),
         share=standing.share,
         doubts=tuple(doubts),
+        curve=curve.curve.words if curve is not None else "",
     )
 
 

@@ -2,7 +2,9 @@
 
 The steps over one variable are replaced by one curve over it, and those of a torque by one factor
 on what the profile predicts, beside the values of the profile's file. Where that explains as much
-with fewer parameters, none of the steps is certain.
+with fewer parameters, none of the steps is certain. Where one curve explains nine tenths of the
+excess and the effects of a search together clearly less, they imitate an unknown law: the search
+ends with the closest one.
 """
 
 from __future__ import annotations
@@ -10,13 +12,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from winchkit.diagnosis.regression.cross_validation import CERTAIN
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, held
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.results import Doubt, Step
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import PartialRegression, ranked_curves
-from winchkit.diagnosis.verdict.open_law import at_places, variables_of_law
+from winchkit.diagnosis.verdict.open_law import MARGIN, at_places, variables_of_law
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.effects.transition import TRANSITION
@@ -26,6 +30,51 @@ _BY_KNOTS = 0.005
 """Share of what a curve explains that the straight pieces between its knots lose."""
 _FACTOR = 1
 """Parameters of a factor."""
+
+
+class CurveInstead:
+    """Whether one free curve explains what the effects of a search together do not.
+
+    Parameters
+    ----------
+    engine
+        The search.
+    initial
+        Its model before the first addition.
+    """
+
+    def __init__(self, engine: TimeSeriesSelection, initial: Fit) -> None:
+        self._engine, self._initial = engine, initial
+        self._imitated = False
+
+    def __call__(self, present: Fit, noise: BandNoise) -> bool:
+        """Whether the additions of ``present`` imitate a curve; asked after each of them."""
+        if len(present.hypothesis.terms) < self._engine.n_initial_terms + 2:
+            return False
+        regression, initial = self._engine.regression, self._initial
+        weights = noise.inverse_sigma(regression)
+        partial = PartialRegression(initial.residual, initial.jacobian, weights)
+        over = partial.chi_square - regression.n_rows
+        by_additions = partial.chi_square - present.chi_square
+        if over - by_additions <= CERTAIN * over:
+            return False
+        price = self._engine.penalty_per_parameter
+        best = ranked_curves(regression, partial, regression.outputs, price)[0].net_gain
+        self._imitated = best >= max((1 - CERTAIN) * over, (1 + MARGIN) * by_additions)
+        return self._imitated
+
+    def closest(self, found: SelectionResult) -> SelectionResult:
+        """The result with the one addition that explains most, where they imitate a curve."""
+        if not self._imitated:
+            return found
+        engine, noise, terms = self._engine, found.noise, found.final.hypothesis.terms
+        initial, runs = self._initial.hypothesis, engine.regression.n_runs
+        alone = [
+            engine.refit(initial.with_term(term, runs), noise)
+            for term in terms[engine.n_initial_terms :]
+        ]
+        final, noise = engine.fit_with_noise(min(alone, key=engine.criterion).hypothesis, noise)
+        return replace(found, final=final, noise=noise)
 
 
 def with_compensations(
@@ -43,9 +92,10 @@ def with_compensations(
         own = [place for place in at if variable in over[place]]
         together = _Together.of(engine, result, file, [at[place] for place in own])
         if together is not None and together.is_curve(variable):
-            what = f"a curve over {variable.replace('_', ' ')}"
+            words = variable.replace("_", " ")
             for place in own:
-                out[place] = _doubted(out[place], "curve", what, len(own))
+                doubted = _doubted(out[place], "curve", f"a curve over {words}", len(own))
+                out[place] = replace(doubted, curve=doubted.curve or words)
     torque = [place for place in at if terms[at[place]].effect.outputs == ("motor_torque",)]
     if any(steps[place].refitted for place in torque):
         together = _Together.of(engine, result, file, [at[place] for place in torque])

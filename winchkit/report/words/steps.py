@@ -211,5 +211,6 @@ def _open_law(step: Step) -> str:
         return "the law is unknown"
     outputs = list(dict.fromkeys(OUTPUT_NAMES.get(p.output, p.output) for p in step.place))
     part, variable = step.place[0].part, step.place[0].variable
-    over = f" over the {variable_name(variable)}" if variable else ""
+    variable = step.curve or (variable and variable_name(variable))
+    over = f" over the {variable}" if variable else ""
     return f"the {part} changes the {listed(outputs)}{over} by an unknown law"
