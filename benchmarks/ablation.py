@@ -77,12 +77,15 @@ RULES: Mapping[str, Mapping[str, Any]] = {
         "diagnose.with_first_members": lambda _, final, __, sets: (final, sets)
     },
     "refitted values": {"diagnose.refitted_steps": lambda *_: ()},
-    "open laws": {"diagnose.better_curve": _nothing},
+    "open laws": {"diagnose.open_law": _nothing},
+    "compensations": {"diagnose.with_compensations": lambda _, __, ___, steps: steps},
+    "imitated curve": {"search.CurveInstead.closest": _second},
     "small steps": {"diagnose.is_small": _no},
     "predictable residual": {"diagnose.predictable_share": lambda *_: 0.0},
     "pairs": {"selection.stepwise._best_pair": _nothing},
     "exchange for a pair": {"selection.stepwise.pair_exchange": _second},
     "exchange": {"selection.stepwise._exchanged_terms": _second},
+    "rest imitated": {"selection.stepwise._imitates_rest": _no},
     "other grid point": {"selection.stepwise.other_grid_point": _no},
     "explained by initial states": {"selection.engine.explained_by_initial_states": _no},
     "minor orders": {
