@@ -16,7 +16,12 @@ from winchkit.profile_edit.ledger import Judged
 
 
 def write_addition(
-    source: str | Path, addition: Addition, runs: Sequence[str], out: str | Path
+    source: str | Path,
+    addition: Addition,
+    runs: Sequence[str],
+    out: str | Path,
+    *,
+    replace: bool = False,
 ) -> None:
     """Write a fitted addition into a copy of a profile, and an entry into its ledger.
 
@@ -28,20 +33,30 @@ def write_addition(
         Result of ``add``.
     runs : sequence of str
         Names of the runs that it was fitted to.
+    replace : bool
+        Write over another profile that exists; over ``source`` always.
 
     Raises
     ------
     FileError
         Where a file cannot be read or written.
+    UsageError
+        For a file that is not to be replaced.
     """
     require_type(addition, Addition, "addition")
     require_types(runs, str, "runs")
     fitted, judged = _provenance(addition.terms, addition.outputs, runs)
-    write_fitted(path_of(source, "source"), fitted, path_of(out, "out"), judged)
+    write_fitted(path_of(source, "source"), fitted, path_of(out, "out"), judged, replace=replace)
 
 
 def write_removal(
-    source: str | Path, effect: str, removal: Removal | None, runs: Sequence[str], out: str | Path
+    source: str | Path,
+    effect: str,
+    removal: Removal | None,
+    runs: Sequence[str],
+    out: str | Path,
+    *,
+    replace: bool = False,
 ) -> None:
     """Write a profile without an effect, with the others refitted where there were runs.
 
@@ -55,18 +70,24 @@ def write_removal(
         Result of ``remove``; None without runs.
     runs : sequence of str
         Names of the runs that the others were refitted to.
+    replace : bool
+        Write over another profile that exists; over ``source`` always.
 
     Raises
     ------
     FileError
         Where a file cannot be read or written.
+    UsageError
+        For a file that is not to be replaced.
     """
     if removal is not None:
         require_type(removal, Removal, "removal")
     require_types(runs, str, "runs")
     terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
     fitted, judged = _provenance(terms, outputs, runs)
-    write_without(path_of(source, "source"), effect, fitted, path_of(out, "out"), judged)
+    write_without(
+        path_of(source, "source"), effect, fitted, path_of(out, "out"), judged, replace=replace
+    )
 
 
 def _provenance(

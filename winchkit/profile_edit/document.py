@@ -11,6 +11,7 @@ from tomlkit.items import AoT
 
 from winchkit.errors import Fault, FileError
 from winchkit.regular_file import read_text
+from winchkit.runs.files import refuse_existing
 from winchkit.schema.profiles.winch import SHORTHANDS
 from winchkit.units import format_quantity
 
@@ -23,6 +24,11 @@ def read_document(path: Path) -> Any:
         raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from error
     except (ParseError, UnicodeDecodeError) as error:
         raise FileError(Fault(f"is not TOML: {error}", str(path))) from error
+
+
+def refuse_other(source: Path, out: Path, replace: bool) -> None:
+    """Raise UsageError where ``out`` is another profile, which is not to be replaced."""
+    refuse_existing(out, replace or (out.exists() and source.exists() and out.samefile(source)))
 
 
 def write_document(document: Any, path: Path) -> None:

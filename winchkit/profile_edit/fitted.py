@@ -21,6 +21,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.profile_edit.document import (
     effect_tables,
     read_document,
+    refuse_other,
     shorthands,
     write_document,
     written,
@@ -41,13 +42,16 @@ class FittedTerm:
     date: date
 
 
-def write_fitted(source: Path, fitted: Sequence[FittedTerm], out: Path, judged: Judged) -> None:
+def write_fitted(
+    source: Path, fitted: Sequence[FittedTerm], out: Path, judged: Judged, *, replace: bool
+) -> None:
     """Copy the profile ``source`` to ``out`` with fitted effects, the last one new.
 
     Raises FileError where a file cannot be read or written.
 
     ``source``, ``out``: the profile, and its copy.
     """
+    refuse_other(source, out, replace)
     document = read_document(source)
     note(document, "add", fitted[-1].term.effect.id, judged)
     _put(document, fitted)
@@ -55,7 +59,13 @@ def write_fitted(source: Path, fitted: Sequence[FittedTerm], out: Path, judged: 
 
 
 def write_without(
-    source: Path, effect_id: str, fitted: Sequence[FittedTerm], out: Path, judged: Judged
+    source: Path,
+    effect_id: str,
+    fitted: Sequence[FittedTerm],
+    out: Path,
+    judged: Judged,
+    *,
+    replace: bool,
 ) -> None:
     """Copy the profile ``source`` to ``out`` without an effect, the others as fitted.
 
@@ -64,6 +74,7 @@ def write_without(
 
     ``source``, ``out``: the profile, and its copy.
     """
+    refuse_other(source, out, replace)
     document = read_document(source)
     short = {SHORTHANDS[key]: key for key in shorthands(document)}
     there = [label for table in effect_tables(document) for label in _labels(table)]

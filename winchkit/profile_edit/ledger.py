@@ -15,6 +15,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.profile_edit.document import (
     effect_tables,
     read_document,
+    refuse_other,
     shorthands,
     tables,
     write_document,
@@ -55,13 +56,15 @@ def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: J
     tables(document, "ledger").append(entry)
 
 
-def undo(source: str | Path, out: str | Path) -> str:
+def undo(source: str | Path, out: str | Path, *, replace: bool = False) -> str:
     """Copy a profile without its last step.
 
     Parameters
     ----------
     source, out : str or Path
         The profile, and its copy.
+    replace : bool
+        Write over another profile that exists; over ``source`` always.
 
     Returns
     -------
@@ -72,8 +75,12 @@ def undo(source: str | Path, out: str | Path) -> str:
     ------
     FileError
         Where the ledger is empty or a file cannot be read or written.
+    UsageError
+        For a file that is not to be replaced.
     """
-    document = read_document(path_of(source, "source"))
+    source, out = path_of(source, "source"), path_of(out, "out")
+    refuse_other(source, out, replace)
+    document = read_document(source)
     steps = tables(document, "ledger")
     if not len(steps):
         raise FileError(Fault("has no ledger: there is nothing to undo", str(source)))
@@ -86,7 +93,7 @@ def undo(source: str | Path, out: str | Path) -> str:
         document[part][name] = value
     del steps[len(steps) - 1]
     _replace(document, effects)
-    write_document(document, path_of(out, "out"))
+    write_document(document, out)
     return f"{last['did']} {last['effect']}"
 
 

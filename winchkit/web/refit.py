@@ -35,7 +35,7 @@ def refit(
     fitted = fitted_addition_to(effect, dataset, catalogue)
     path = folder / f"version-{len(state.versions)}.toml"
     names = [item.name for item in state.used]
-    write_addition(state.versions[-1].path, fitted.addition, names, path)
+    write_addition(state.versions[-1].path, fitted.addition, names, path, replace=True)
     outputs = fitted.addition.outputs
     before = {name: out.heldout_rms_before for name, out in outputs.items()}
     label = (

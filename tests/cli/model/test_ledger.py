@@ -74,6 +74,18 @@ def test_an_effect_goes_without_runs_too(runs: list[Path], declared: Path, tmp_p
     assert "—" in shown
     assert invoke("remove", "gear-efficiency", "-p", less, "-o", less).exit_code == 0
     assert read_profile(less).gearbox.efficiency is None
+    before = added.read_bytes()
+    for words in (
+        ("remove", "gear-efficiency"),
+        ("add", "cell-gain", "--fit", *runs),
+        ("undo",),
+    ):
+        refused = invoke(*words, "-p", less, "-o", added)
+        assert refused.exit_code == 2
+        assert "exists already" in refused.stderr
+        assert added.read_bytes() == before
+    assert invoke("undo", "-p", less, "-o", added, "--replace").exit_code == 0
+    assert read_profile(added).gearbox.efficiency == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.core.completion import complete_effect, complete_effect_of_profile
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import output_option
+from winchkit.cli.core.options import output_option, replace_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 @click.argument("effect", shell_complete=complete_effect)
 @fit_option("Runs to fit.", required=True)
 @output_option("Profile to write.", "NEW.toml", required=True)
+@replace_option
 @model_options
 @json_flag("Print the answer as JSON.")
 @html_option
@@ -51,6 +52,7 @@ def command(
     effect: str,
     runs: Sequence[str],
     output: str,
+    replace: bool,
     asked: Asked,
     html: str | None,
     figures: str | None,
@@ -62,7 +64,9 @@ def command(
     """
     from winchkit.diagnosis.add import fitted_addition
     from winchkit.diagnosis.write import write_addition
+    from winchkit.profile_edit.document import refuse_other
 
+    refuse_other(Path(asked.source), Path(output), replace)
     declared, catalogue = declared_profile(asked.source), asked.catalogue
     refuse_options(declared, asked.band)
     names = [Path(run).name for run in runs]
@@ -71,7 +75,7 @@ def command(
         progress(f"fitting {effect}", None)
         named = asked.placed(effect, declared)
         fitted = fitted_addition(named, own, declared, catalogue, asked.band)
-    write_addition(asked.source, fitted.addition, names, Path(output))
+    write_addition(asked.source, fitted.addition, names, output, replace=replace)
     _tell(output, fitted.addition.to_json(), fitted.addition)
     if html:
         from winchkit.report.pages.pages import addition_html
@@ -98,9 +102,10 @@ def command(
 @click.argument("effect", shell_complete=complete_effect_of_profile)
 @fit_option("Runs to refit the others on.")
 @output_option("Profile to write.", "NEW.toml", required=True)
+@replace_option
 @model_options
 @json_flag("Print the answer as JSON.")
-def remove(effect: str, runs: Sequence[str], output: str, asked: Asked) -> None:
+def remove(effect: str, runs: Sequence[str], output: str, replace: bool, asked: Asked) -> None:
     """Write a profile without EFFECT; with --fit the other effects are refitted.
 
     A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger records the
@@ -108,7 +113,9 @@ def remove(effect: str, runs: Sequence[str], output: str, asked: Asked) -> None:
     """
     from winchkit.diagnosis.add import remove as removed
     from winchkit.diagnosis.write import write_removal
+    from winchkit.profile_edit.document import refuse_other
 
+    refuse_other(Path(asked.source), Path(output), replace)
     declared, removal = declared_profile(asked.source), None
     refuse_options(declared, asked.band)
     effect = asked.placed(effect, declared)
@@ -118,7 +125,7 @@ def remove(effect: str, runs: Sequence[str], output: str, asked: Asked) -> None:
             own = asked.runs(runs, declared)
             removal = removed(effect, own, declared, asked.catalogue, asked.band)
     names = [Path(run).name for run in runs]
-    write_removal(asked.source, effect, removal, names, output)
+    write_removal(asked.source, effect, removal, names, output, replace=replace)
     nothing = {"schema": 1, "effect": effect, "outputs": {}, "parameters": {}, "notes": []}
     _tell(output, nothing if removal is None else removal.to_json(), removal)
     if runs:

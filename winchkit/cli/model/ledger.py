@@ -9,7 +9,7 @@ import click
 from winchkit.catalog import find
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import suggest_next
-from winchkit.cli.core.options import output_option
+from winchkit.cli.core.options import output_option, replace_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import declared_profile, html_option, profile_option, write_page
@@ -48,7 +48,8 @@ def command(profile: str, html: str | None) -> None:
 )
 @profile_option
 @output_option("Profile to write; else the same file.", "NEW.toml")
-def undo(profile: str, output: str | None) -> None:
+@replace_option
+def undo(profile: str, output: str | None, replace: bool) -> None:
     """Undo the last 'add' or 'remove'; the values that it refitted are restored too."""
     from winchkit.profile_edit.ledger import undo as undone
 
@@ -58,6 +59,6 @@ def undo(profile: str, output: str | None) -> None:
     declared_profile(source)
     if output is None and source != Path(profile):
         raise UsageError(f"'{profile}' ships with winchkit; write the copy to a file with -o")
-    done = undone(source, Path(output) if output else source)
+    done = undone(source, Path(output or source), replace=replace)
     click.echo(f"taken back: {done}")
     suggest_next("ledger", "-p", output or profile)

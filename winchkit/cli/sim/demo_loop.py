@@ -122,7 +122,8 @@ def learn(runs: list[Run], profile_name: str, out: Path) -> LoopResult:
     if not answer.diagnosis.steps:
         return LoopResult(answer, None)
     addition = add(answer.diagnosis.steps[0].effects[0], runs, profile)
-    write_addition(nominal, addition, [run.name for run in runs], out / "improved.toml")
+    names = [run.name for run in runs]
+    write_addition(nominal, addition, names, out / "improved.toml", replace=True)
     return LoopResult(answer, addition)
 
 

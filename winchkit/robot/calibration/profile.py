@@ -17,7 +17,12 @@ from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.errors import UsageError
 from winchkit.model.rotation import angles_of, rotation_by, rotation_of
-from winchkit.profile_edit.document import effect_tables, read_document, write_document
+from winchkit.profile_edit.document import (
+    effect_tables,
+    read_document,
+    refuse_other,
+    write_document,
+)
 from winchkit.robot.calibration.calibrate import Calibrated
 from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.identification.instruments import NUMBERS
@@ -41,7 +46,9 @@ class Provenance:
     date: date
 
 
-def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenance) -> None:
+def write_calibrated(
+    source: Path, found: Calibrated, out: Path, where: Provenance, *, replace: bool = False
+) -> None:
     """Copy a robot's profile with the estimates of a calibration.
 
     Lines that name a winch file get its tables as their own, since their radii now differ.
@@ -54,17 +61,21 @@ def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenan
         The estimates.
     where : Provenance
         Date and runs, written into the table ``[fitted]``.
+    replace : bool
+        Write over another profile that exists; over ``source`` always.
 
     Raises
     ------
     FileError
         Where a file cannot be read or written.
     UsageError
-        With ``found.refusal`` where the robot is not calibrated.
+        With ``found.refusal`` where the robot is not calibrated, and for a file that is not to be
+        replaced.
     """
     require_type(found, Calibrated, "found")
     if found.refusal:
         raise UsageError(found.refusal)
+    refuse_other(source, out, replace)
     document = read_document(source)
     for line in document["line"]:
         _line(line, source, found)

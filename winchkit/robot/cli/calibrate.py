@@ -17,6 +17,7 @@ from winchkit.cli.core.options import (
     bench_file_option,
     output_option,
     quantity_option,
+    replace_option,
 )
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
@@ -100,6 +101,7 @@ _NOISE_DIMENSIONS = {
     help="Run for validation only; without it every tenth pose.",
 )
 @output_option("Profile to write.", "NEW.toml", required=True)
+@replace_option
 @click.option(
     "--effect",
     "effects",
@@ -134,6 +136,7 @@ def command(
     accuracy: str | None,
     validate: Sequence[str],
     output: str,
+    replace: bool,
     effects: Sequence[str],
     noise: Sequence[str],
     middle_force: str | None,
@@ -155,10 +158,12 @@ def command(
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import optional, quantity
+    from winchkit.profile_edit.document import refuse_other
     from winchkit.robot.calibration.options import Options
     from winchkit.robot.calibration.pose_design import next_poses
 
     source = find("profiles", robot)
+    refuse_other(source, Path(output), replace)
     options = Options(tuple(effects), _noise(noise), optional(middle_force, "force"))
     if bool(runs) + bool(bench) + bool(sim) != 1:
         raise UsageError(
@@ -183,7 +188,7 @@ def command(
     if len(ahead) < following:
         click.echo(f"only {len(ahead)} of {following} poses can be held by the cables", err=True)
     if not found.refusal:
-        _write(source, found, Path(output), runs)
+        _write(source, found, Path(output), runs, replace)
     _tell(found, ahead)
     if fit_report and not is_json():
         click.echo(f"\n{found.fit_report()}")
@@ -262,11 +267,12 @@ def _noise(given: Sequence[str]) -> Mapping[str, float]:
     return out
 
 
-def _write(source: Path, found: Calibrated, out: Path, runs: Sequence[str]) -> None:
+def _write(source: Path, found: Calibrated, out: Path, runs: Sequence[str], replace: bool) -> None:
     from datetime import UTC, datetime
 
     from winchkit.robot.calibration.profile import Provenance, write_calibrated
 
     today = datetime.now(UTC).date()
-    write_calibrated(source, found, out, Provenance([Path(run).name for run in runs], today))
+    where = Provenance([Path(run).name for run in runs], today)
+    write_calibrated(source, found, out, where, replace=replace)
     note(f"written: {out}")

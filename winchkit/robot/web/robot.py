@@ -169,7 +169,8 @@ class RobotWork:
         out = self.folder / extended_name(self._state.source, "calibrated")
         names = [path.name for path in self._state.files]
         source = find("profiles", self._state.source)
-        write_calibrated(source, found, out, Provenance(names, datetime.now(UTC).date()))
+        where = Provenance(names, datetime.now(UTC).date())
+        write_calibrated(source, found, out, where, replace=True)
         return out.name, out.read_text(encoding="utf-8")
 
     def report(self) -> str:
