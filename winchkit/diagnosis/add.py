@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from winchkit.arguments import require_type, require_types
@@ -13,6 +13,7 @@ from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import held
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -119,6 +120,39 @@ class FittedWinchAddition(FittedAddition):
     regression: TimeSeriesRegression
     initial_model: Fit
     final: Fit
+    engine: TimeSeriesSelection
+    noise: BandNoise
+
+    def with_values(
+        self, terms: Sequence[tuple[Term, Mapping[str, Estimate]]]
+    ) -> FittedWinchAddition:
+        """The same effects at other values, with the errors of the prediction by them.
+
+        ``terms``: some or all of the addition's effects, in any order.
+        """
+        values = {term.label: (term, own) for term, own in terms}
+        hypothesis = self.final.hypothesis
+        at = replace(
+            hypothesis,
+            terms=tuple(
+                held(values[term.label][0]) if term.label in values else term
+                for term in hypothesis.terms
+            ),
+        )
+        fitted = self.engine.fixed(at, self.noise)
+        after = output_fits(self.engine, (fitted, self.noise), (fitted, self.noise))
+        outputs = {
+            name: replace(
+                output,
+                rms_after=after[name].rms_after,
+                heldout_rms_after=after[name].heldout_rms_after,
+            )
+            for name, output in self.addition.outputs.items()
+        }
+        new = tuple(values.get(term.label, (term, own)) for term, own in self.addition.terms)
+        return replace(
+            self, addition=replace(self.addition, outputs=outputs, terms=new), final=fitted
+        )
 
 
 def add(
@@ -215,7 +249,12 @@ def fitted_addition_to(
     terms = tuple(estimates(engine.regression, best.fit, spread))
     addition = Addition(outputs, terms, _notes(engine, best))
     return FittedWinchAddition(
-        engine.regression, in_units_of(dataset.profile, addition), before[0], best.fit
+        engine.regression,
+        in_units_of(dataset.profile, addition),
+        before[0],
+        best.fit,
+        engine,
+        best.noise,
     )
 
 
@@ -240,7 +279,7 @@ def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedW
     )
     addition = Addition(outputs, tuple(terms), _notes(engine, best))
     addition = in_units_of(dataset.profile, addition)
-    return FittedWinchAddition(engine.regression, addition, before, best.fit)
+    return FittedWinchAddition(engine.regression, addition, before, best.fit, engine, best.noise)
 
 
 def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:

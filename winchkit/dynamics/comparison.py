@@ -60,18 +60,26 @@ def simulated_errors(
     return [error for run in runs for error in _of_run(run, profile, catalogue)]
 
 
+def smoothed_rate(run: Run, profile: WinchProfile) -> tuple[Array, float]:
+    """Motor speed of a run as the model smooths it, (n,), rad/s, and its noise."""
+    velocity = run.channels.get("motor_velocity")
+    signals = Signals(
+        run.time,
+        run["motor_angle"],
+        motor_velocity=None if velocity is None else velocity.values,
+    )
+    clock = Line(profile).motion(signals).clock
+    return clock.rate, clock.rate_noise
+
+
 def _of_run(
     run: Run, profile: WinchProfile, catalogue: Catalogue | None
 ) -> Iterator[SimulatedError]:
     terms = terms_of(profile, catalogue)
     (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     measured = own["motor_angle"]
-    velocity = own.channels.get("motor_velocity")
-    signals = Signals(
-        own.time, measured, motor_velocity=None if velocity is None else velocity.values
-    )
-    clock = Line(profile).motion(signals).clock
-    speed = float(clock.rate[0])
+    rate, rate_noise = smoothed_rate(own, profile)
+    speed = float(rate[0])
     for driven_by in ("torque", "reference"):
         if driven_by == "reference" and (profile.control is None or GOAL not in own):
             continue
@@ -81,7 +89,7 @@ def _of_run(
         rms = float(np.sqrt(np.mean(error**2)))
         until = None
         if driven_by == "torque":
-            faster: Setup = replace(setup, speed=speed + clock.rate_noise)
+            faster: Setup = replace(setup, speed=speed + rate_noise)
             grown = np.abs(motion_of(profile, terms, faster).angle - simulated)
             beyond = np.flatnonzero(grown > rms)
             until = float(own.time[beyond[0]]) if len(beyond) else None

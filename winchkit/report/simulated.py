@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from winchkit.diagnosis.compare import WinchCompared
 from winchkit.diagnosis.residuals.traces import OutputTrace
 from winchkit.dynamics.comparison import SimulatedError
+from winchkit.dynamics.refit import MotionFit
 from winchkit.quantity_text import quantity
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.figures.reduction import decimated
@@ -34,6 +35,16 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
     if all(e.meaningful_until is None for e in errors if e.driven_by == "torque"):
         text = "the uncertain initial speed makes a smaller error than the model, to the end"
         lines += entries([text])
+    return "\n".join(lines)
+
+
+def refit_text(fitted: MotionFit) -> str:
+    """Error of the simulated motion before and after its values were refitted to it."""
+    before, after = (quantity(x, fitted.unit) for x in (fitted.rms_before, fitted.rms_after))
+    text = f"simulated from the measured torque, the motion is off by {after} rms; by {before} "
+    lines = entries([text + "with the values of the prediction"])
+    if not fitted.converged:
+        lines += entries(["the fit to the motion did not converge: its values may change"])
     return "\n".join(lines)
 
 

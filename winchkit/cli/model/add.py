@@ -27,9 +27,14 @@ from winchkit.cli.model.options import (
     write_figures,
     write_page,
 )
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.add import Addition, Removal
+    from winchkit.cli.core.terminal import ProgressCallback
+    from winchkit.diagnosis.add import Addition, FittedAddition, Removal
+    from winchkit.diagnosis.profiles import Profile
+    from winchkit.dynamics.refit import MotionFit
+    from winchkit.runs.run import Run
 
 
 @click.command(
@@ -43,6 +48,11 @@ if TYPE_CHECKING:
 @fit_option("Runs to fit.", required=True)
 @output_option("Profile to write.", "NEW.toml", required=True)
 @replace_option
+@click.option(
+    "--refit",
+    type=click.Choice(["motion"]),
+    help="Refit the values so that the measured torque makes the measured motion.",
+)
 @model_options
 @json_flag("Print the answer as JSON.")
 @html_option
@@ -53,6 +63,7 @@ def command(
     runs: Sequence[str],
     output: str,
     replace: bool,
+    refit: str | None,
     asked: Asked,
     html: str | None,
     figures: str | None,
@@ -60,7 +71,9 @@ def command(
     """Fit EFFECT together with those of a profile to runs, and write the new profile.
 
     Values that the profile has already are refitted with it; every value gets its standard
-    deviation, the runs and the date.
+    deviation, the runs and the date. They predict the torque of a motion; with --refit motion they
+    are refitted so that the motion simulated from the measured torque is the measured one, as a
+    simulator needs them.
     """
     from winchkit.diagnosis.add import fitted_addition
     from winchkit.diagnosis.write import write_addition
@@ -75,8 +88,12 @@ def command(
         progress(f"fitting {effect}", None)
         named = asked.placed(effect, declared)
         fitted = fitted_addition(named, own, declared, catalogue, asked.band)
+        moved = None
+        if refit:
+            fitted, moved = _refitted_to_motion(fitted, own, declared, progress)
     write_addition(asked.source, fitted.addition, names, output, replace=replace)
-    _tell(output, fitted.addition.to_json(), fitted.addition)
+    motion = {} if moved is None else {"motion": moved.to_json()}
+    _tell(output, {**fitted.addition.to_json(), **motion}, fitted.addition, moved)
     if html:
         from winchkit.report.pages.pages import addition_html
 
@@ -134,8 +151,45 @@ def remove(effect: str, runs: Sequence[str], output: str, replace: bool, asked: 
         suggest_next("ledger", "-p", output)
 
 
-def _tell(output: str, data: dict[str, Any], fitted: Addition | Removal | None) -> None:
+def _tell(
+    output: str,
+    data: dict[str, Any],
+    fitted: Addition | Removal | None,
+    moved: MotionFit | None = None,
+) -> None:
+    from winchkit.report.simulated import refit_text
     from winchkit.report.text import addition_text
 
     note(f"written: {output}")
-    tell(data, [] if fitted is None else [addition_text(fitted)])
+    lines = [] if fitted is None else [addition_text(fitted)]
+    tell(data, lines if moved is None else [*lines, f"\n{refit_text(moved)}"])
+
+
+def _refitted_to_motion(
+    fitted: FittedAddition, runs: Sequence[Run], profile: Profile, progress: ProgressCallback
+) -> tuple[FittedAddition, MotionFit]:
+    """An addition at the values that make the measured motion; raises UsageError for a robot."""
+    from winchkit.diagnosis.add import FittedWinchAddition
+    from winchkit.diagnosis.results import Estimate
+    from winchkit.dynamics.refit import refit_to_motion
+    from winchkit.schema.profiles.winch import WinchProfile
+
+    if not (isinstance(fitted, FittedWinchAddition) and isinstance(profile, WinchProfile)):
+        raise UsageError("--refit motion simulates one winch or axis; choose one with --winch")
+    old = fitted.addition.terms
+
+    def step(number: int) -> None:
+        progress(f"refitting to the motion, step {number}", None)
+
+    moved = refit_to_motion(runs, profile, [term for term, _ in old], step)
+    new = [
+        (
+            term,
+            {
+                name: Estimate(term.values[name], std[name], own.unit) if name in std else own
+                for name, own in known.items()
+            },
+        )
+        for term, std, (_, known) in zip(moved.terms, moved.std, old, strict=True)
+    ]
+    return fitted.with_values(new), moved

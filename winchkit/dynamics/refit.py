@@ -1,0 +1,335 @@
+"""Values of effects refitted to the simulated motion by multiple shooting.
+
+A prediction is of the torque of a given motion; a simulator needs values with which the measured
+torque makes the measured motion. Each run is cut into pieces whose initial angle and speed are
+unknowns, and a piece has to end where the next one begins: a start that is off diverges within one
+piece only. Runs of effects with memory, whose states nobody measured, are one piece.
+
+References
+----------
+Bock, H. G., Plitt, K. J. (1984). A multiple shooting algorithm for direct solution of optimal
+control problems. IFAC Proceedings 17, 1603-1608.
+Liang, K.-Y., Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models.
+Biometrika 73, 13-22.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from winchkit.arguments import require_type, require_types
+from winchkit.arrays import Array
+from winchkit.dynamics.balance import ON_MOTION, balance
+from winchkit.dynamics.comparison import smoothed_rate
+from winchkit.dynamics.drives import Inputs
+from winchkit.dynamics.forward import Setup, motion_of, setup_of
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
+from winchkit.errors import UsageError
+from winchkit.runs.linear_axis import rotary_runs
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
+
+_PIECES = 10
+"""Pieces of a run; rule of thumb: an error of the start grows over a tenth of it only."""
+_JOINED = 10.0
+"""Weight of a gap between two pieces over that of an error as large at all of their samples; EMPS:
+three and a hundred end at the same values within their standard deviations."""
+_STEP = 1e-3
+"""Relative change of a coordinate in a difference; above the error of the integration."""
+_MOST = 20
+"""Steps of the fit; computing cost: each simulates every run once for each value."""
+_TOLERANCE = 1e-6
+"""Relative error of a step of the integration, far below that of the model."""
+_SETTLED = 0.1
+"""Change of the sum of squares in units of its mean that ends the fit: a value that is off by its
+standard deviation changes it by one."""
+
+
+@dataclass(frozen=True)
+class MotionFit:
+    """Values refitted to the simulated motion, and its errors.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        All effects, those between torque and motion with new values.
+    std : tuple of dict of str to float
+        Standard deviations of the new values, SI; empty of an effect that does not act on the
+        motion.
+    unit : str
+        Of the errors: ``rad``, or ``m`` on a linear axis.
+    rms_before, rms_after : float
+        Error of the motion simulated over whole runs from the measured torque: before from the
+        measured initial state, after from that of the fit.
+    converged : bool
+        Whether the fit ended before the limit of its steps.
+    """
+
+    terms: tuple[Term, ...]
+    std: tuple[dict[str, float], ...]
+    unit: str
+    rms_before: float
+    rms_after: float
+    converged: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """The errors and the status, as the command prints them."""
+        names = ("unit", "rms_before", "rms_after", "converged")
+        return {name: getattr(self, name) for name in names}
+
+
+def refit_to_motion(
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    terms: Sequence[Term],
+    progress: Callable[[int], None] = lambda step: None,
+) -> MotionFit:
+    """Refit effects so that the measured torque makes the measured motion.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Runs with motor angle and torque.
+    profile : WinchProfile
+        The winch or the axis.
+    terms : sequence of Term
+        All its effects, at the values from which the fit starts.
+    progress : callable
+        Called with the number of the fit's step.
+
+    Raises
+    ------
+    RunError
+        For a run without angle or torque, or with missing values.
+    UsageError
+        For effects without a step, and a motion that cannot be simulated, as :func:`forward`; where
+        no effect acts on the motion.
+
+    Notes
+    -----
+    Least squares of the position over all pieces. The standard deviations allow for errors that
+    are correlated within a piece (cluster-robust covariance).
+    """
+    require_types(runs, Run, "runs")
+    require_type(profile, WinchProfile, "profile")
+    fitted = tuple(index for index, term in enumerate(terms) if _acts_on_motion(term))
+    if not fitted:
+        raise UsageError("no effect acts between the motor's torque and its motion: nothing to fit")
+    pieces = tuple(_of_runs(runs, profile, terms))
+    return _Shooting(profile, tuple(terms), fitted, pieces).solved(progress)
+
+
+def _acts_on_motion(term: Term) -> bool:
+    """Whether an effect with fitted values is between the torque and the motion."""
+    between = term.effect.stage in ON_MOTION or term.effect.undo is not None
+    return between and len(Coordinates(term.effect)) > 0
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A stretch of a run with its own initial state."""
+
+    setup: Setup
+    measured: Array
+    """Motor angle at its times, (n,)."""
+    is_first: bool
+    """Whether it begins a run, with the state that is measured there."""
+
+
+def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
+    for run in runs:
+        (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+        rate, _ = smoothed_rate(own, profile)
+        whole = setup_of(profile, run, None, float(rate[0]), is_torque=True)
+        law = balance(profile, terms, whole.load_mass, is_load_known="load" in whole.inputs.signals)
+        count = 1 if law.states else _PIECES
+        ends = np.linspace(0, len(whole.time) - 1, count + 1).round().astype(int)
+        angle = own["motor_angle"]
+        for begin, end in pairwise(ends.tolist()):
+            there = slice(begin, end + 1)
+            signals = {name: values[there] for name, values in whole.inputs.signals.items()}
+            time = whole.time[there]
+            setup = replace(
+                whole,
+                time=time,
+                angle=float(angle[begin]),
+                speed=float(rate[begin]),
+                inputs=Inputs(time, signals),
+            )
+            yield _Piece(setup, angle[there], begin == 0)
+
+
+@dataclass(frozen=True)
+class _Shooting:
+    """Least-squares problem over the coordinates of the effects and the states of the pieces."""
+
+    profile: WinchProfile
+    terms: tuple[Term, ...]
+    fitted: tuple[int, ...]
+    """Effects between the torque and the motion."""
+    pieces: tuple[_Piece, ...]
+
+    @cached_property
+    def start(self) -> Array:
+        """Coordinates of the effects, (p,)."""
+        own = [self.terms[index] for index in self.fitted]
+        return np.concatenate([np.zeros(0), *(Coordinates(t.effect).vector(t.values) for t in own)])
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper coordinates, (p,) each."""
+        own = [Coordinates(self.terms[index].effect).bounds() for index in self.fitted]
+        low, high = (np.concatenate(side) for side in zip(*own, strict=True))
+        return low, high
+
+    def terms_at(self, x: Array) -> tuple[Term, ...]:
+        """All effects, the fitted ones at coordinates (p,)."""
+        out, place = list(self.terms), 0
+        for index in self.fitted:
+            term = self.terms[index]
+            count = len(own := Coordinates(term.effect))
+            values = own.values(x[place : place + count], term.values)
+            out[index], place = Term(term.effect, values), place + count
+        return tuple(out)
+
+    def states_at(self, x: Array) -> Array:
+        """Initial angle and speed of every piece, (pieces, 2)."""
+        return x[len(self.start) :].reshape(-1, 2)
+
+    def ends(self, terms: Sequence[Term], states: Array) -> list[tuple[Array, float]]:
+        """Angle of every piece at its times, and its last speed; NaN where it is not possible."""
+        out = []
+        for piece, (angle, speed) in zip(self.pieces, states, strict=True):
+            setup = replace(piece.setup, angle=float(angle), speed=float(speed))
+            try:
+                motion = motion_of(self.profile, terms, setup, _TOLERANCE)
+            except UsageError:
+                out.append((np.full_like(piece.measured, np.nan), np.nan))
+            else:
+                out.append((motion.angle, float(motion.speed[-1])))
+        return out
+
+    def residual(self, ends: Sequence[tuple[Array, float]], states: Array) -> Array:
+        """Errors of the angle at all samples, and weighted gaps between the pieces."""
+        errors, gaps = [], []
+        for k, (piece, (angle, speed)) in enumerate(zip(self.pieces, ends, strict=True)):
+            errors.append(angle - piece.measured)
+            if k + 1 < len(self.pieces) and not self.pieces[k + 1].is_first:
+                weight = _JOINED * len(angle) ** 0.5
+                lasts = float(piece.setup.time[-1] - piece.setup.time[0])
+                gap = np.array([angle[-1], speed]) - states[k + 1]
+                gaps.append(weight * gap * (1.0, lasts))
+        return np.concatenate([*errors, *gaps])
+
+    def solved(self, progress: Callable[[int], None]) -> MotionFit:
+        """The least-squares fit."""
+        count, trials = len(self.start), [0]
+        first = np.concatenate([self.start, self.states_of_data.ravel()])
+        free = np.full(2 * len(self.pieces), np.inf)
+        low, high = (
+            np.append(side, sign * free) for side, sign in zip(self.bounds, (-1, 1), strict=True)
+        )
+        if not np.all(np.isfinite(self._residual_at(first))):
+            # The error of the simulation itself says what is missing.
+            for piece in self.pieces:
+                motion_of(self.profile, self.terms, piece.setup, _TOLERANCE)
+
+        def jacobian(x: Array) -> Array:
+            trials[0] += 1
+            progress(trials[0])
+            return self._jacobian_at(x)
+
+        inside = np.clip(first, low, high)
+        found = least_squares(
+            self._residual_at, inside, jacobian, (low, high), x_scale="jac", max_nfev=_MOST,
+            ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
+        )  # fmt: skip
+        covariance = self._covariance(np.asarray(found.jac), found.fun)
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))[:count]
+        terms, std, place = self.terms_at(found.x[:count]), list[dict[str, float]](), 0
+        for index, term in enumerate(self.terms):
+            own = Coordinates(term.effect)
+            if index not in self.fitted:
+                std.append({})
+                continue
+            part = slice(place, place + len(own))
+            std.append(own.deviations(found.x[part], deviations[part], term.values))
+            place += len(own)
+        return MotionFit(
+            terms, tuple(std), "m" if self.profile.is_linear else "rad",
+            self.rms(self.terms, self.states_of_data), self.rms(terms, self.states_at(found.x)),
+            found.status > 0,
+        )  # fmt: skip
+
+    @cached_property
+    def states_of_data(self) -> Array:
+        """Initial angle and speed of every piece as measured, (pieces, 2)."""
+        return np.array([(piece.setup.angle, piece.setup.speed) for piece in self.pieces])
+
+    def rms(self, terms: Sequence[Term], states: Array) -> float:
+        """Error of the whole runs simulated from the states (pieces, 2) at their beginnings."""
+        squares, count = 0.0, 0
+        angle, speed = 0.0, 0.0
+        for piece, state in zip(self.pieces, states.tolist(), strict=True):
+            if piece.is_first:
+                angle, speed = state
+            setup = replace(piece.setup, angle=angle, speed=speed)
+            motion = motion_of(self.profile, terms, setup, _TOLERANCE)
+            angle, speed = float(motion.angle[-1]), float(motion.speed[-1])
+            squares += float(np.sum((motion.angle - piece.measured) ** 2))
+            count += len(piece.measured)
+        return float((squares / count) ** 0.5)
+
+    def _residual_at(self, x: Array) -> Array:
+        states = self.states_at(x)
+        return self.residual(self.ends(self.terms_at(x[: len(self.start)]), states), states)
+
+    def _jacobian_at(self, x: Array) -> Array:
+        """Differences: each value changes all pieces, a state changes its own one."""
+        count, states = len(self.start), self.states_at(x)
+        terms = self.terms_at(x[:count])
+        ends = self.ends(terms, states)
+        here = self.residual(ends, states)
+        out = np.zeros((len(here), len(x)))
+        _, high = self.bounds
+        for j in range(count):
+            step = _STEP * max(abs(float(x[j])), 0.1)
+            moved = x[:count].copy()
+            moved[j] += step if x[j] + step <= high[j] else -step
+            there = self.residual(self.ends(self.terms_at(moved), states), states)
+            out[:, j] = (there - here) / (moved[j] - x[j])
+        for which in range(2):
+            step = _STEP * max(float(np.std(states[:, which])), 1e-3)
+            shifted = states.copy()
+            shifted[:, which] += step
+            moved_ends = self.ends(terms, shifted)
+            for k, moved_end in enumerate(moved_ends):
+                own, own_states = list(ends), states.copy()
+                own[k], own_states[k] = moved_end, shifted[k]
+                out[:, count + 2 * k + which] = (self.residual(own, own_states) - here) / step
+        return out
+
+    def _covariance(self, jacobian: Array, residual: Array) -> Array:
+        """Cluster-robust covariance of all unknowns, a cluster being a tenth of a run."""
+        scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+        unit = jacobian / scale
+        inverse = np.linalg.pinv(unit.T @ unit, hermitian=True)
+        meat, begin, clusters = np.zeros_like(inverse), 0, 0
+        for piece in self.pieces:
+            end = begin + len(piece.measured)
+            parts = _PIECES if len(self.pieces) < _PIECES else 1
+            for rows in np.array_split(np.arange(begin, end), parts):
+                gradient = unit[rows].T @ residual[rows]
+                meat += np.outer(gradient, gradient)
+                clusters += 1
+            begin = end
+        factor = clusters / max(clusters - 1, 1)
+        return np.asarray(factor * inverse @ meat @ inverse / np.outer(scale, scale))
