@@ -386,6 +386,25 @@ def test_a_log_outlives_the_jog_that_opened_the_bench(served: Path, tmp_path: Pa
     assert len(read_run(log)) == told["rows"]
 
 
+def test_files_that_were_edited_while_the_bench_is_open_are_told_or_read_again(
+    tmp_path: Path,
+) -> None:
+    with served_bench(tmp_path) as bench, logging(bench, tmp_path / "lift.csv") as logger:
+        before = owner(bench)
+        text = bench.read_text()
+        bench.write_text(
+            text.replace("[winch.A.limits]", '[winch.A.limits]\nresponse_time = "1 s"')
+        )
+        second = winchkit("log", "-b", str(bench), "-o", str(tmp_path / "b.csv"), "--for", "0.5s")
+        assert second.returncode == 0, second.stderr
+        assert "with other files than these: what is shown and logged is by those" in second.stderr
+        assert owner(bench) == before
+        asked = winchkit("cell", "info", "A", "-b", str(bench))
+        assert asked.returncode == 0, asked.stderr
+        assert owner(bench) != before, "a calibration, say, is that of the new file"
+        until_written(tmp_path / "lift-2.csv", logger)
+
+
 def test_a_program_takes_the_bench_from_a_log_which_goes_on(served: Path, tmp_path: Path) -> None:
     log = tmp_path / "lift.csv"
     with logging(served, log) as logger:
