@@ -26,6 +26,7 @@ _positions = st.builds(
         st.integers(-(2**31), 2**32 - 1),
         max_size=40,
     ),
+    unit=st.floats(-1.0, 1.0),
 )
 
 

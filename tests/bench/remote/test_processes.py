@@ -231,6 +231,21 @@ def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) ->
     assert "winch A was stopped by stop (process " in words
 
 
+def test_a_stop_of_a_programme_that_owns_the_bench_latches_nothing(
+    served: Path, tmp_path: Path
+) -> None:
+    """The programme ends by the stop, and closes the bench while the stop confirms."""
+    words = ("run", "programme-demo-slow", "-y", "-b", str(served), "-o", str(tmp_path))
+    with start(*words) as run:
+        until_moving(served, run)
+        stopped = winchkit("stop", "-b", str(served))
+        assert stopped.returncode == 0, stopped.stderr
+        code, said = ended(run)
+    assert code == 5
+    assert "was stopped by stop" in said
+    assert winchkit("jog", "-b", str(served), "--wind-in", "5mm").returncode == 0
+
+
 def test_one_bench_process_serves_commands_that_start_together(served: Path) -> None:
     until(lambda: not runs(owner(served)), 90, "the bench process did not end")
     options = ("-b", str(served), "--json", "--for", "2s")
