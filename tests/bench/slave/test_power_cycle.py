@@ -151,7 +151,7 @@ def test_another_drive_is_unknown(rig: Rig) -> None:
     ("index", "sub", "value", "reason"),
     [
         (0x607E, 0, 0x80, r"is 65536 (reversed by 607Eh) counts of 6064h and was 65536 when"),
-        (0x608F, 1, 131_072, r"is 131072 counts of 6064h and was 65536 when it was homed"),
+        (0x6092, 1, 131_072, r"is 131072 counts of 6064h and was 65536 when it was homed"),
     ],
 )
 def test_a_count_of_another_size_or_sense_is_no_known_length(
@@ -165,7 +165,7 @@ def test_a_count_of_another_size_or_sense_is_no_known_length(
         bench.winch["A"].home(at=_LENGTH)
     with opened(rig, encoder) as bench:
         assert bench.winch["A"].cable_length == pytest.approx(_LENGTH, abs=1e-3)
-        rig.slaves[0].objects.set(index, sub, {0x607E: 0, 0x608F: 65_536}[index])
+        rig.slaves[0].objects.set(index, sub, {0x607E: 0, 0x6092: 65_536}[index])
         rig.slaves[0].inject("reboots")
         rig.wait(1.0)
         bench.reset()
