@@ -62,6 +62,8 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
         """Command specifiers of its answer; none where any answers, such as a segment."""
         self.answered_twice = 0
         """Answers to a request that was answered: of a second node, or to another client."""
+        self.awaits_late = True
+        """Whether an answer that missed its time is waited for, to say how late it comes."""
 
     def send_request(self, request: Any) -> None:
         self._arrived.clear()
@@ -85,7 +87,8 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
         asked = self._clock.now()
         if not self._arrived.wait(self.RESPONSE_TIMEOUT):
             # Only a node that has answered before is waited for again: a dead one costs no more.
-            late = self._answered and self._arrived.wait(self.RESPONSE_TIMEOUT)
+            waits = self._answered and self.awaits_late
+            late = waits and self._arrived.wait(self.RESPONSE_TIMEOUT)
             raise _NoAnswer(self._clock.now() - asked if late else None)
         return super().read_response()
 
@@ -219,6 +222,14 @@ class SdoNode:
     def read(self, index: int, sub: int = 0) -> int:
         """Value of an integer object; raises NoReply, DeviceRefused."""
         return self._number(index, sub, self.upload(index, sub))
+
+    def probe(self, index: int) -> int:
+        """Read from a node that may still boot, and then answers nothing; as :meth:`read`."""
+        self._sdo.awaits_late = False
+        try:
+            return self.read(index)
+        finally:
+            self._sdo.awaits_late = True
 
     def upload(self, index: int, sub: int = 0) -> bytes:
         """Bytes of any object as the device sends them; raises NoReply, DeviceRefused."""
