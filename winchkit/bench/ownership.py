@@ -91,19 +91,19 @@ def mark_stop(spec: BenchSpec) -> None:
 
 
 @contextmanager
-def unless_stopped(spec: BenchSpec) -> Iterator[Callable[[], None]]:
+def unless_stopped(
+    spec: BenchSpec, doing: str = "opened: nothing was moved; give the command again"
+) -> Iterator[Callable[[], None]]:
     """Yield a check that raises MotionError where a stop has come since; errors are that one, too.
 
-    Whoever opens a bench calls it last, when the next stop would find it.
+    Whoever opens a bench calls it last, when the next stop would find it. ``doing`` says what was
+    done to the bench, and what became of it.
     """
     before = _stops(spec)
 
     def check() -> None:
         if _stops(spec) != before:
-            raise MotionError(
-                f"a stop came while bench '{spec.name}' was being opened: nothing was moved; give "
-                "the command again"
-            )
+            raise MotionError(f"a stop came while bench '{spec.name}' was being {doing}")
 
     try:
         yield check

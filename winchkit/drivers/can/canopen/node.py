@@ -43,7 +43,7 @@ def sdo_client(remote: canopen.RemoteNode, clock: Clock) -> Any:
     return client
 
 
-class _NoAnswer(canopen.SdoCommunicationError):  # type: ignore[misc]
+class _NoAnswer(canopen.SdoCommunicationError):
     """No answer within the time-out; ``after`` (s) where it came within the same time again."""
 
     def __init__(self, after: float | None) -> None:
