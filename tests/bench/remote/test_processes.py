@@ -401,7 +401,7 @@ def test_a_log_outlives_the_jog_that_opened_the_bench(served: Path, tmp_path: Pa
     assert len(read_run(log)) == told["rows"]
 
 
-def test_files_that_were_edited_while_the_bench_is_open_are_told_or_read_again(
+def test_files_that_were_edited_while_the_bench_is_open_are_reported_or_read_again(
     tmp_path: Path,
 ) -> None:
     with served_bench(tmp_path) as bench, logging(bench, tmp_path / "lift.csv") as logger:

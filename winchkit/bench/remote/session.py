@@ -180,7 +180,7 @@ def serves(
     """Whether the owner has the bench as it is asked for; else it was asked to end, or it raises.
 
     A bench process that opened the bench before its files were changed is started anew, but for an
-    observer, who is told.
+    observer, to whom it is reported.
     """
     changed = station.lends and station.digest != digest_of(spec)
     if changed and observer and not effects:

@@ -60,8 +60,8 @@ def command(bench: str, *, dry_run: bool) -> None:
             _tell([Stopped(name, True, _BY_OWNER) for name in spec.winch])
             return
     except WinchkitError as error:
-        # An owner that has been told, and is closing the bench, would take the bus for a second
-        # master's, and latch that.
+        # An owner that has the stop, and is closing the bench, would take the frames for those of
+        # a second master, and latch that.
         await_end(spec, _CLOSING)
         click.echo(f"winchkit: {error}; acting on the bus itself", err=True)
     _stop_on_bus(spec)
