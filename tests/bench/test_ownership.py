@@ -1,15 +1,17 @@
-"""The digest by which a client recognises that the owner has opened the bench with other files."""
+"""The digest of the files that a bench was opened with, and the lock of its owner."""
 
 from __future__ import annotations
 
 import shutil
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from slave.wire import GENERIC
 from snippets import ROOT
-from winchkit.bench.ownership import digest_of
+from winchkit.bench.ownership import Ownership, await_end, digest_of
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_bench
 
@@ -73,3 +75,18 @@ def test_a_file_that_is_missing_changes_the_digest_and_raises_nothing(
         (tmp_path / name).unlink()
         digests.add(digest_of(spec))
     assert len(digests) == 1 + len(FILES)
+
+
+def test_the_end_of_an_owner_is_awaited_but_not_for_ever(spec: BenchSpec) -> None:
+    """`winchkit stop` asks the drives itself only then: an owner that closes would take it for
+    a second master."""
+    owner = Ownership(spec)
+    begun = time.monotonic()
+    await_end(spec, 0.1)
+    assert time.monotonic() - begun >= 0.1
+    ending = threading.Timer(0.1, owner.close)
+    ending.start()
+    await_end(spec, 60.0)
+    ending.join()
+    assert time.monotonic() - begun < 30.0
+    Ownership(spec).close()

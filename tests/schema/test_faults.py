@@ -181,6 +181,18 @@ def test_two_devices_at_one_address(bench: Path) -> None:
     assert faults == [(18, "winch.B.servo.node", "1 on this bus is taken by winch.A.servo")]
 
 
+@pytest.mark.parametrize(("node", "host"), [(1, "node = 1\n"), (127, "")])
+def test_a_device_has_not_the_number_of_the_host(bench: Path, node: int, host: str) -> None:
+    """Its heartbeat and the host's would have one identifier."""
+    text = BENCH.replace("node = 1", f"node = {node}", 1)
+    text = text.replace('kind = "can"\n', f'kind = "can"\n{host}', 1)
+    (fault,) = faults_of(bench, text)
+    assert fault[1:] == (
+        "winch.A.servo.node",
+        f"{node} on this bus is taken by the host (bus.can.node)",
+    )
+
+
 def test_a_bench_without_a_winch(bench: Path) -> None:
     faults = faults_of(bench, 'schema = 1\nkind = "bench"\nbus = {}\nwinch = {}\n')
     assert [(line, key) for line, key, _ in faults] == [(4, "winch")]

@@ -186,10 +186,11 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     assert loop.snapshot is not None, "an open bench has had a cycle"
     seen = loop.snapshot
     cleared = [str(trip) for trip in seen.tripped]
-    for axis in axes.values():
+    for name, axis in axes.items():
         # What somebody else commands during the reset keeps it from succeeding.
         axis.forget_second_master()
         axis.forget_position_jump()
+        loop.winches[name].rested.forget()
     found = _ResetFindings(
         unheard=frozenset(t.winch for t in (*seen.tripped, *seen.blocked) if t.kind in _UNHEARD),
         lost=frozenset(name for name, axis in axes.items() if axis.lost_set_up),

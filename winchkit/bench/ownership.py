@@ -23,6 +23,8 @@ from winchkit.schema.bench import BenchSpec
 
 _CONNECT_TIME = 2.0
 """s: an owner accepts at once; one under load within some tenths."""
+_LOOK = 0.01
+"""s, between two looks whether an owner has ended; short against the stop that waits for it."""
 
 
 def digest_of(spec: BenchSpec) -> str:
@@ -89,19 +91,19 @@ def mark_stop(spec: BenchSpec) -> None:
 
 
 @contextmanager
-def unless_stopped(spec: BenchSpec) -> Iterator[Callable[[], None]]:
+def unless_stopped(
+    spec: BenchSpec, doing: str = "opened: nothing was moved; give the command again"
+) -> Iterator[Callable[[], None]]:
     """Yield a check that raises MotionError where a stop has come since; errors are that one, too.
 
-    Whoever opens a bench calls it last, when the next stop would find it.
+    Whoever opens a bench calls it last, when the next stop would find it. ``doing`` says what was
+    done to the bench, and what became of it.
     """
     before = _stops(spec)
 
     def check() -> None:
         if _stops(spec) != before:
-            raise MotionError(
-                f"a stop came while bench '{spec.name}' was being opened: nothing was moved; give "
-                "the command again"
-            )
+            raise MotionError(f"a stop came while bench '{spec.name}' was being {doing}")
 
     try:
         yield check
@@ -120,6 +122,10 @@ def _stops(spec: BenchSpec) -> str:
 
 def _stop_file(spec: BenchSpec) -> Path:
     return _folder() / f"{_key(spec)}.stop"
+
+
+def _lock_file(spec: BenchSpec) -> Path:
+    return _folder() / f"{_key(spec)}.lock"
 
 
 def _owner_file(spec: BenchSpec) -> Path:
@@ -147,7 +153,8 @@ def _key(spec: BenchSpec) -> str:
     return hashlib.sha1("|".join(buses).encode(), usedforsecurity=False).hexdigest()[:16]
 
 
-def _owner_name(spec: BenchSpec) -> str:
+def owner_name(spec: BenchSpec) -> str:
+    """What the owner of the bench calls itself."""
     try:
         number, _, name = _owner_file(spec).read_text().partition("\n")
     except OSError:
@@ -176,12 +183,11 @@ class Ownership:
 
     def __init__(self, spec: BenchSpec, name: str = "") -> None:
         """Own it as ``name``; raise NotPermitted, naming the owner, when another one does."""
-        path = _folder() / f"{_key(spec)}.lock"
-        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        self._descriptor = os.open(_lock_file(spec), os.O_RDWR | os.O_CREAT, 0o600)
         if not _lock(self._descriptor):
             os.close(self._descriptor)
             raise NotPermitted(
-                f"bench '{spec.name}' is owned by {_owner_name(spec)}; one process owns a bench, "
+                f"bench '{spec.name}' is owned by {owner_name(spec)}; one process owns a bench, "
                 "use `winchkit stop`, `monitor`, `log` beside it or end it first"
             )
         _owner_file(spec).write_text(f"{os.getpid()}\n{name}")
@@ -189,6 +195,17 @@ class Ownership:
     def close(self) -> None:
         """Let it go."""
         os.close(self._descriptor)
+
+
+def await_end(spec: BenchSpec, within: float) -> None:
+    """Return when no process owns the bench, after ``within`` (s) in any case."""
+    end = time.monotonic() + within
+    descriptor = os.open(_lock_file(spec), os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        while not _lock(descriptor) and time.monotonic() < end:
+            time.sleep(_LOOK)
+    finally:
+        os.close(descriptor)
 
 
 def listen(spec: BenchSpec) -> tuple[socket.socket, Path]:

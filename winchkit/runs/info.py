@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
@@ -10,17 +10,13 @@ from typing import Any
 import numpy as np
 
 from winchkit.arguments import require_type
-from winchkit.arrays import Array
 from winchkit.runs.align import MAY_LACK, PATIENCE
+from winchkit.runs.gaps import LOST, gap_lengths, lost_samples
 from winchkit.runs.layout import SignalSource, SourceSamples
 from winchkit.runs.log import Log, Note
-from winchkit.runs.run import Run, lost_samples
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import counted
 
-_GAP = 1.5
-"""Steps beyond this many usual ones are gaps: midway between one and two, which is one sample
-lost."""
-_LOST = 2.5
-"""Shortest stretch without a value in usual intervals: two samples and jitter."""
 _QUALITY = "quality"
 
 
@@ -32,9 +28,9 @@ class SourceInfo:
     channels: tuple[str, ...]
     samples: int
     rate: float
-    """Over the whole log, Hz; NaN with fewer than two samples."""
+    """Outside its gaps, Hz; NaN with fewer than two samples."""
     gaps: int
-    """Number of intervals longer than 1.5 usual ones, those to the log's ends included."""
+    """Number of gaps, those to the log's ends included (see :mod:`winchkit.runs.gaps`)."""
     longest_gap: float
     """Longest interval, s."""
     missing: Mapping[str, int]
@@ -130,21 +126,9 @@ def _source_info(
 ) -> SourceInfo:
     times = np.unique(samples.times)
     steps = np.diff(times)
-    # Samples that an adapter has buffered arrive in bursts: their median interval is not the rate.
-    mean = float(steps.mean()) if len(steps) else float("nan")
-    usual = max(float(np.median(steps)), mean) if len(steps) else mean
-    lost = np.flatnonzero(steps > _GAP * usual)
-    # From the beginning of the log to the first sample, and from the last to its end.
-    ends = [(span[0], times[0]), (times[-1], span[1])] if len(times) else [span]
-    limit = max(source.max_gap, 0.0 if np.isnan(usual) else _GAP * usual)
+    even = steps[~lost_samples(times)]
     columns = {item.column: samples.values[:, n] for n, item in enumerate(source.signals)}
-    gaps = _merged(
-        {
-            *zip(times[lost].tolist(), times[lost + 1].tolist(), strict=True),
-            *((float(begin), float(end)) for begin, end in ends if end - begin > limit),
-            *_holes(samples.times, columns, span),
-        }
-    )
+    gaps = gap_lengths(samples.times, columns, span, source.max_gap)
     names = [signal.column or signal.name for signal in source.signals]
     lacks = np.isnan(samples.values).sum(axis=0).tolist()
     flags = [n for n, signal in enumerate(source.signals) if signal.name == _QUALITY]
@@ -152,7 +136,7 @@ def _source_info(
         source.topic,
         tuple(names),
         len(samples),
-        1 / mean,
+        1 / float(even.mean()) if len(even) else float("nan"),
         len(gaps),
         # The longest interval is given where there is no gap too.
         float(max([*steps, *gaps], default=np.nan)),
@@ -171,8 +155,7 @@ class RunSummary:
     rate: float
     """Samples a second from the median interval, Hz; NaN where rows are not samples in time."""
     gaps: int
-    """Number of intervals in which samples were lost, and of those above half a second in which a
-    channel has no value."""
+    """Number of gaps (see :mod:`winchkit.runs.gaps`)."""
     missing: Mapping[str, int]
     """Samples without a value, by channel."""
     constant: tuple[str, ...]
@@ -186,9 +169,9 @@ class RunSummary:
         times = [] if np.isnan(self.rate) else [f"{self.duration:.6g} s at {self.rate:.4g} Hz"]
         holes = [f"{name} {count}" for name, count in self.missing.items() if count]
         parts = [
-            _counted(self.rows, "row"),
+            counted(self.rows, "row"),
             *times,
-            _counted(self.gaps, "gap"),
+            counted(self.gaps, "gap"),
             f"NaN: {', '.join(holes)}" if holes else "no NaN",
         ]
         parts += [f"{name} has no value in the last {t:.3g} s" for name, t in self.ended.items()]
@@ -208,20 +191,11 @@ def summary_of(run: Run) -> RunSummary:
         rows=len(run),
         duration=float(run.time[-1] - run.time[0]),
         rate=1 / run.interval if in_time else float("nan"),
-        gaps=_gaps(run) if in_time else 0,
+        gaps=run.gaps if in_time else 0,
         missing={name: channel.missing for name, channel in run.channels.items()},
         constant=constant,
         ended=dict(_ended(run)) if in_time else {},
     )
-
-
-def _gaps(run: Run) -> int:
-    """Intervals in which samples were lost, or in which a channel has no value."""
-    lost = np.flatnonzero(lost_samples(run.time))
-    stamps = zip(run.time[lost].tolist(), run.time[lost + 1].tolist(), strict=True)
-    columns = {name: run[name] for name in run}
-    span = float(run.time[0]), float(run.time[-1])
-    return len(_merged({*stamps, *_holes(run.time, columns, span)}))
 
 
 def _ended(run: Run) -> Iterator[tuple[str, float]]:
@@ -230,47 +204,10 @@ def _ended(run: Run) -> Iterator[tuple[str, float]]:
         known = np.flatnonzero(~np.isnan(channel.values))
         if len(known) and not name.endswith(MAY_LACK):
             left = float(run.time[-1] - run.time[known[-1]])
-            if left > max(PATIENCE, _LOST * run.interval):
+            if left > max(PATIENCE, LOST * run.interval):
                 yield name, left
-
-
-def _holes(
-    times: Array, columns: Mapping[str, Array], span: tuple[float, float]
-) -> set[tuple[float, float]]:
-    """Stretches in which samples have no value, as begin and end, s.
-
-    They are longer than half a second and than two intervals; a single sample is none. Channels
-    that lack their values together have one in common.
-    """
-    found: set[tuple[float, float]] = set()
-    steps = np.diff(np.unique(times))
-    shortest = max(PATIENCE, _LOST * float(np.median(steps)) if len(steps) else 0.0)
-    for name, values in columns.items():
-        lacks = np.isnan(values)
-        if not name or name.endswith(MAY_LACK) or not lacks.any():
-            continue
-        marks = np.concatenate([span[:1], times[~lacks], span[1:]])
-        between = np.diff(np.searchsorted(times[lacks], marks)) > 0
-        long = np.flatnonzero(between & (np.diff(marks) > shortest))
-        found |= set(zip(marks[long].tolist(), marks[long + 1].tolist(), strict=True))
-    return found
-
-
-def _merged(intervals: Iterable[tuple[float, float]]) -> list[float]:
-    """Lengths of intervals (begin, end), those that overlap joined to one."""
-    joined: list[tuple[float, float]] = []
-    for begin, end in sorted(intervals):
-        if joined and begin < joined[-1][1]:
-            joined[-1] = joined[-1][0], max(end, joined[-1][1])
-        else:
-            joined.append((begin, end))
-    return [end - begin for begin, end in joined]
 
 
 def _is_constant(run: Run, name: str) -> bool:
     values = run[name][~np.isnan(run[name])]
     return len(values) > 1 and bool(np.all(values == values[0]))
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count or 'no'} {noun}s"

@@ -6,35 +6,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.rendering import Plotted
 from winchkit.runs.channel_values import is_real, real_numbers
+from winchkit.runs.gaps import gap_lengths
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse
 
 ANGLE_INTEGRATED = "integral of motor_velocity"
 """Metadata ``motor_angle`` of a run whose recording has no angle."""
-_GAP = 2.5
-"""Shortest gap in median intervals, as in the comparison: one missing sample and jitter."""
-_WHOLE = 0.05
-"""Deviation of an interval from a whole number of usual ones up to which it has lost samples."""
-
-
-def lost_samples(time: Array) -> NDArray[np.bool_]:
-    """Intervals in which samples were lost.
-
-    ``time`` (n,): stamps, s, increasing. Returns (n - 1,) of bool: longer than 2.5 median
-    intervals, or a whole number of them to 5 %.
-    """
-    steps = np.diff(time)
-    if not len(steps):
-        return np.zeros(0, dtype=bool)
-    steps = steps / np.median(steps)
-    whole = np.round(steps)
-    return np.asarray((steps > _GAP) | ((whole > 1) & (np.abs(steps - whole) <= _WHOLE)))
 
 
 @dataclass(frozen=True)
@@ -139,8 +121,8 @@ class Run(Plotted, Tabular):
 
     @property
     def gaps(self) -> int:
-        """Number of intervals in which samples were lost, see :func:`lost_samples`."""
-        return int(np.count_nonzero(lost_samples(self.time)))
+        """Number of gaps (see :mod:`winchkit.runs.gaps`)."""
+        return len(gap_lengths(self.time, {name: self[name] for name in self}))
 
     def winches(self) -> list[str]:
         """Names of the winches, from columns ``A.motor_angle``; ``[""]`` without prefixes."""

@@ -21,9 +21,10 @@ from winchkit.bench.commissioning import record
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.procedure import commission_bench
 from winchkit.bench.commissioning.record import CommissioningRecord
+from winchkit.bench.ownership import mark_stop
 from winchkit.bench.remote.server import StationServer
 from winchkit.cli.bench.commission import command
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import MotionError, NotPermitted, UsageError
 
 
 def commissioned(
@@ -81,6 +82,28 @@ def test_motion_waits_for_the_record_and_ends_with_a_changed_drive(
         pytest.raises(NotPermitted, match="serial number is 4712, commissioned was 4711"),
     ):
         opened.winch["A"].jog(pay_out=0.05, duration=0.2)
+
+
+@pytest.mark.parametrize("key", ["A.brake", "A.host_loss", "A.direction_go", "A.units", "sign"])
+def test_a_stop_ends_it_and_nothing_is_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    """Given by somebody else while a question is open; the answer enables nothing."""
+    with served(write_bench(tmp_path)) as bench:
+        ask, begun = AnswerFile.ask, list[int]()
+
+        def stopped(self: AnswerFile, now: str, *rest: Any) -> str:
+            if now == key:
+                mark_stop(bench.spec)
+                begun.append(len(bench.rig.samples[0]))
+            return ask(self, now, *rest)
+
+        monkeypatch.setattr(AnswerFile, "ask", stopped)
+        with pytest.raises(MotionError, match=r"a stop came while .* being commissioned"):
+            commissioned(bench)
+        assert not bench.record.exists()
+        later = bench.rig.samples[0][begun[0] :]
+        assert all(sample.state is not State.ENABLED for sample in later)
 
 
 def test_a_drive_that_goes_on_when_the_host_dies_gets_no_record(tmp_path: Path) -> None:

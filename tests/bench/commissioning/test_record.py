@@ -91,6 +91,7 @@ def test_a_changed_file_is_named(spec: BenchSpec, file: str, words: str) -> None
         ({"product": 9}, "product code is 9"),
         ({"revision": 9}, "revision number is 9"),
         ({"software": "1.3"}, r"software version \(100Ah\) is 1.3, commissioned was 1.2"),
+        ({"polarity": 0x80}, r"polarity \(607Eh\) is 128, commissioned was None"),
     ],
 )
 def test_another_drive_is_named_by_what_differs(

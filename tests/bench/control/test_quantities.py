@@ -69,6 +69,7 @@ FORMULAS: dict[tuple[str, str], Formula] = {
         item.feedback_age > own.stale and item.missed_syncs >= 5
     ),
     ("motion at rest", ""): lambda item, own, _: abs(item.winding_speed) > own.rest_speed,
+    ("creep at rest", ""): lambda item, _own, _: abs(item.way[1]) > 0.02,
     ("slowing down", ""): lambda _item, _own, memory: memory.unresponsive,
     ("deviation", ""): lambda item, own, _: (
         abs(item.winding_speed - item.commanded) > 0.25 * own.limits.speed

@@ -16,6 +16,7 @@ from sim_process import first_line, start
 from winchkit.runs import read_run
 from winchkit.runs.info import info_of, summary_of
 from winchkit.runs.read import read_log
+from winchkit.runs.sanity.inspection import inspect_run
 
 _PERIOD = EVERY["cell"] * CYCLE
 
@@ -89,6 +90,25 @@ def test_gaps_count_up_to_both_ends_of_the_log(tmp_path: Path, before: float, af
     assert cell.longest_gap == pytest.approx(max(before if not after else 0.0, after), abs=0.1)
     assert sources["/B/cell"].gaps == 0
     assert (sources["/B/temperature"].samples, sources["/B/temperature"].gaps) == (0, 1)
+
+
+def test_a_file_has_one_number_of_gaps_whoever_counts(tmp_path: Path) -> None:
+    """Lost rows (one and many, in a row and a long interval), and a channel without values."""
+    time = np.delete(np.arange(1000) / 100, [50, *range(120, 125), *range(400, 620)])
+    tension = 100 + np.sin(time)
+    tension[(time > 7) & (time < 8)] = np.nan
+    angle = 5 * np.sin(time)
+    path = tmp_path / "a.csv"
+    rows = zip(time.tolist(), angle.tolist(), tension.tolist(), strict=True)
+    lines = [f"{t:.4f},{a:.6f},{'' if n != n else f'{n:.3f}'}" for t, a, n in rows]
+    path.write_text("\n".join(["time [s],motor_angle [rad],tension [N]", *lines]) + "\n")
+    run = read_run(path)
+    (source,) = info_of(read_log(path)).sources
+    (found,) = (item for item in inspect_run(run).findings if item.code == "gap")
+    assert (run.gaps, summary_of(run).gaps, source.gaps) == (4, 4, 4)
+    assert found.text.startswith("4 gaps")
+    assert source.longest_gap == pytest.approx(2.21)
+    assert source.rate == pytest.approx(100), "the gaps do not make it slower"
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from small_disk import run_on_small_disk
 from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
@@ -26,6 +27,7 @@ _positions = st.builds(
         st.integers(-(2**31), 2**32 - 1),
         max_size=40,
     ),
+    unit=st.floats(-1.0, 1.0),
 )
 
 
@@ -111,3 +113,14 @@ def test_without_a_path_nothing_is_kept() -> None:
     assert file.open() == ()
     assert file.keep({"A": KEPT}) is None
     assert file.found == {}
+
+
+def test_a_full_disk_is_a_trip_and_leaves_no_draft(tmp_path: Path) -> None:
+    script = """
+from winchkit.bench.records.position_file import PositionFile
+(disk / "logs").write_bytes(bytes(4096))
+trips = PositionFile(str(disk / "bench.position.json")).open()
+print([trip.kind for trip in trips], [file.name for file in disk.iterdir()])
+"""
+    done = run_on_small_disk(tmp_path, script, "8k")
+    assert done.stdout == "['position record'] ['logs']\n", done.stderr

@@ -231,6 +231,21 @@ def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) ->
     assert "winch A was stopped by stop (process " in words
 
 
+def test_a_stop_of_a_programme_that_owns_the_bench_latches_nothing(
+    served: Path, tmp_path: Path
+) -> None:
+    """The programme ends by the stop, and closes the bench while the stop confirms."""
+    words = ("run", "programme-demo-slow", "-y", "-b", str(served), "-o", str(tmp_path))
+    with start(*words) as run:
+        until_moving(served, run)
+        stopped = winchkit("stop", "-b", str(served))
+        assert stopped.returncode == 0, stopped.stderr
+        code, said = ended(run)
+    assert code == 5
+    assert "was stopped by stop" in said
+    assert winchkit("jog", "-b", str(served), "--wind-in", "5mm").returncode == 0
+
+
 def test_one_bench_process_serves_commands_that_start_together(served: Path) -> None:
     until(lambda: not runs(owner(served)), 90, "the bench process did not end")
     options = ("-b", str(served), "--json", "--for", "2s")
@@ -384,6 +399,25 @@ def test_a_log_outlives_the_jog_that_opened_the_bench(served: Path, tmp_path: Pa
     told = json.loads(out)
     assert told["files"] == {str(log): told["rows"]}
     assert len(read_run(log)) == told["rows"]
+
+
+def test_files_that_were_edited_while_the_bench_is_open_are_reported_or_read_again(
+    tmp_path: Path,
+) -> None:
+    with served_bench(tmp_path) as bench, logging(bench, tmp_path / "lift.csv") as logger:
+        before = owner(bench)
+        text = bench.read_text()
+        bench.write_text(
+            text.replace("[winch.A.limits]", '[winch.A.limits]\nresponse_time = "1 s"')
+        )
+        second = winchkit("log", "-b", str(bench), "-o", str(tmp_path / "b.csv"), "--for", "0.5s")
+        assert second.returncode == 0, second.stderr
+        assert "with other files than these: what is shown and logged is by those" in second.stderr
+        assert owner(bench) == before
+        asked = winchkit("cell", "info", "A", "-b", str(bench))
+        assert asked.returncode == 0, asked.stderr
+        assert owner(bench) != before, "a calibration, say, is that of the new file"
+        until_written(tmp_path / "lift-2.csv", logger)
 
 
 def test_a_program_takes_the_bench_from_a_log_which_goes_on(served: Path, tmp_path: Path) -> None:

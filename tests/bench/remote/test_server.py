@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -159,3 +161,15 @@ def test_an_argument_that_cannot_be_sent_is_refused_and_the_connection_stays(ben
         with pytest.raises(UsageError, match="move: an argument cannot be sent: a PosixPath is no"):
             station.move("A", to=Path("3 m"))  # type: ignore[arg-type]
         assert station.names() == ["A"]
+
+
+def test_what_fails_in_a_bench_process_before_it_is_open_is_a_defect_of_it_too() -> None:
+    code = (
+        "import sys; from winchkit.schema import read; read.read_bench = lambda _: 1 / 0; "
+        "from winchkit.bench.remote import process; sys.argv = ['', 'bench.toml']; process.main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert json.loads(done.stdout) == {"defect": "ZeroDivisionError: division by zero"}
+    assert "Traceback" in done.stderr, "its log has the place"

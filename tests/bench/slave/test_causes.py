@@ -163,14 +163,28 @@ def test_a_slow_opening_says_what_it_waits_for(
     assert "setting up" not in capsys.readouterr().err, "a quick opening says nothing"
 
 
-def test_the_time_for_an_answer_is_that_of_the_bench_file(tmp_path: Path) -> None:
+def test_an_answer_that_is_too_late_is_called_late_and_the_file_says_how_long(
+    tmp_path: Path,
+) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     rig.wait(0.3)
     rig.slaves[0].inject("sdo delayed", 0.7)
     text = bench_text(rig.channel)
-    with pytest.raises(NoReply, match=r"no answer within 0\.5 s"):
+    words = (
+        r'no answer within 0\.5 s; it came after 0\.7 s: set sdo_timeout in \[bus\.can\] .*"1\.4 s"'
+    )
+    with pytest.raises(NoReply, match=words):
         rig.open(text)
     rig.wait(2.0)
-    with rig.opened(text.replace("heartbeat =", 'sdo_timeout = "1 s"\nheartbeat =')) as bench:
+    with rig.opened(text.replace("heartbeat =", 'sdo_timeout = "1.4 s"\nheartbeat =')) as bench:
         rig.slaves[0].mend_all()
         bench.winch["A"].move_by(pay_out=0.01)
+
+
+def test_a_drive_that_has_not_answered_yet_may_be_slow(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.wait(0.3)
+    rig.slaves[0].inject("sdo delayed", 30.0)
+    words = r"check power, .*, and for a slow drive set sdo_timeout in \[bus\.can\]"
+    with pytest.raises(NoReply, match=rf"no answer within 0\.5 s; {words}"):
+        rig.open()

@@ -469,3 +469,24 @@ def test_the_latch_outlives_a_killed_process(tmp_path: Path) -> None:
         again.reset()
         again.winch["A"].move_by(pay_out=0.02)
     assert not Path(again.spec.latch_file).exists()
+
+
+@pytest.mark.parametrize("turned", [0.6, -0.6])
+def test_a_brake_that_lets_the_load_creep_is_noticed(tmp_path: Path, turned: float) -> None:
+    """At 1.8 mm/s of cable: below every speed that counts as a motion at rest."""
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        for length in (3.0, 4.0, 3.0):  # another zero is no motion
+            bench.winch["A"].home(at=length)
+            rig.wait(1.0)
+        assert not bench.snapshot.tripped
+        begun = rig.slaves[0].motor.angle
+        rig.slaves[0].inject("turns while disabled", turned)
+        rig.until(lambda: bool(bench.snapshot.tripped), within=30.0)
+        assert "since rest was commanded" in str(bench.snapshot.tripped[0])
+        assert abs(rig.slaves[0].motor.angle - begun) * 3e-3 == pytest.approx(0.02, abs=2e-3)
+        rig.slaves[0].mend_all()
+        bench.reset()
+        rig.wait(1.0)
+        bench.winch["A"].move_by(pay_out=0.05)
+        assert not bench.snapshot.tripped

@@ -144,6 +144,12 @@ CASES = (
         resting({"winding_speed": 0.0029}),
         after=0.1,
     ),
+    Case(
+        "creep at rest",
+        "",
+        resting({"way": (0.0, -0.0201)}),
+        resting({"way": (0.0, -0.0199)}),
+    ),
     Case("slowing down", "", _slowing(0.1), _slowing(0.0), after=0.065),
     Case(
         "deviation",

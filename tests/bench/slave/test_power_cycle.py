@@ -146,6 +146,33 @@ def test_another_drive_is_unknown(rig: Rig) -> None:
         require_unknown(bench, "another drive: its serial number (1018h:4) is 4711")
 
 
+@pytest.mark.parametrize("encoder", ["incremental", "absolute"])
+@pytest.mark.parametrize(
+    ("index", "sub", "value", "reason"),
+    [
+        (0x607E, 0, 0x80, r"is 65536 (reversed by 607Eh) counts of 6064h and was 65536 when"),
+        (0x6092, 1, 131_072, r"is 131072 counts of 6064h and was 65536 when it was homed"),
+    ],
+)
+def test_a_count_of_another_size_or_sense_is_no_known_length(
+    rig: Rig, encoder: str, index: int, sub: int, value: int, reason: str
+) -> None:
+    """The count is that of the record, and stands for another angle."""
+    homed_and_closed(rig, encoder)
+    rig.slaves[0].objects.set(index, sub, value)
+    with opened(rig, encoder) as bench:
+        require_unknown(bench, reason)
+        bench.winch["A"].home(at=_LENGTH)
+    with opened(rig, encoder) as bench:
+        assert bench.winch["A"].cable_length == pytest.approx(_LENGTH, abs=1e-3)
+        rig.slaves[0].objects.set(index, sub, {0x607E: 0, 0x6092: 65_536}[index])
+        rig.slaves[0].inject("reboots")
+        rig.wait(1.0)
+        bench.reset()
+        rig.wait(1.0)
+        require_unknown(bench, "when it was homed")
+
+
 @pytest.mark.parametrize("moving", [True, False])
 def test_a_reboot_within_a_process_trips_and_leaves_the_length_unknown(
     rig: Rig, moving: bool

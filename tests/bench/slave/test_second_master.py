@@ -79,6 +79,18 @@ def test_a_word_that_the_next_rpdo_takes_back_is_a_trip(tmp_path: Path) -> None:
     assert seen.left <= 3 * CYCLE
 
 
+@pytest.mark.parametrize(("word", "named"), [(0x02, True), (0x06, False)])
+def test_a_quick_stop_of_somebody_else_may_be_a_winchkit_stop(
+    tmp_path: Path, word: int, named: bool
+) -> None:
+    """One that found no owner yet, while the bench was being opened."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        rig.from_stranger(*write(0x6040, word, 2))
+        rig.until(lambda: bool(bench.snapshot.tripped), within=1.0)
+        assert ("as of a `winchkit stop`" in str(bench.snapshot.tripped[0])) is named
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_of_somebody_else_is_a_latched_trip(tmp_path: Path, name: str) -> None:

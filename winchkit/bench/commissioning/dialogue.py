@@ -31,6 +31,21 @@ class Dialogue(Protocol):
         """
 
 
+class StoppedDialogue:
+    """Ends another one where a stop has come: nothing is enabled but after an answer."""
+
+    def __init__(self, dialogue: Dialogue, check: Callable[[], None]) -> None:
+        """``check`` raises MotionError after a stop."""
+        self.source, self.show = dialogue.source, dialogue.show
+        self._ask, self._check = dialogue.ask, check
+
+    def ask(self, key: str, question: str, choices: tuple[str, ...] = ()) -> str:
+        """The other one's answer."""
+        answer = self._ask(key, question, choices)
+        self._check()
+        return answer
+
+
 class TypedAnswers:
     """Questions on a stream, answers from another."""
 

@@ -22,6 +22,7 @@ from winchkit.bench.commissioning.dialogue import (
     YES_OR_NO,
     AnswerFile,
     Dialogue,
+    StoppedDialogue,
     TypedAnswers,
     agreed,
     confirm,
@@ -39,6 +40,7 @@ from winchkit.bench.commissioning.record import (
     write_record,
 )
 from winchkit.bench.commissioning.trial import TrialResult, Trials
+from winchkit.bench.ownership import unless_stopped
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
@@ -70,8 +72,14 @@ _LIMITS = (
 def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> CommissioningRecord:
     """Lead through every item and write the record beside the bench file; returns it.
 
-    Raises NotPermitted for what was not confirmed or did not stop, and every error of opening.
+    Raises NotPermitted for what was not confirmed or did not stop, MotionError where a stop came
+    meanwhile, and every error of opening.
     """
+    with unless_stopped(spec, "commissioned: nothing was recorded; begin anew") as check:
+        return _commission(spec, StoppedDialogue(dialogue, check), clock)
+
+
+def _commission(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> CommissioningRecord:
     spec.require_winches()
     if not spec.path:
         raise NotPermitted("a bench without a file cannot be commissioned; write a bench file")

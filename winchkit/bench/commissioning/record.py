@@ -37,13 +37,15 @@ class FileHash:
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """Which drive it was: 1018h, and its software version 100Ah."""
+    """Which drive it was: 1018h, its software version 100Ah, and the sense of its motion."""
 
     vendor: int = 0
     product: int = 0
     revision: int = 0
     serial: int = 0
     software: str = ""
+    polarity: int | None = None
+    """607Eh, which reverses the confirmed direction; None where the drive has none."""
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,7 @@ _NAMES = {
     "revision": "revision number",
     "serial": "serial number",
     "software": "software version (100Ah)",
+    "polarity": "polarity (607Eh)",
 }
 
 
@@ -190,7 +193,8 @@ def drive_record(axis: Cia402Axis) -> DriveRecord:
     identity = identity_of(port)
     software = Objects(port, port.dictionary).text(0x100A)
     return DriveRecord(
-        identity.vendor, identity.product, identity.revision, identity.serial, software
+        *(identity.vendor, identity.product, identity.revision, identity.serial, software),
+        polarity=port.read_if_there(0x607E),
     )
 
 

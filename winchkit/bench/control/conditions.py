@@ -271,6 +271,18 @@ CONDITIONS: tuple[Condition, ...] = (
         when="disabled",
     ),
     Condition(
+        "creep at rest",
+        "cable moved by the motor since the winch was disabled, in steps below 2 mm",
+        "20 mm",
+        Exceeds("missing", lambda _own: 0.0),
+        lambda item, *_: (
+            f"the motor has turned by {item.way[1]:.3f} m of cable since rest was commanded (limit "
+            "0.020 m): the brake slips, or somebody turns it; secure the load, then reset"
+        ),
+        latches=True,
+        when="disabled",
+    ),
+    Condition(
         "slowing down",
         "measured cable speed while the commanded speed falls",
         "the fastest commanded within limits.response_time, and 5 %",

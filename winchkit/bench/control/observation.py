@@ -104,7 +104,7 @@ class WinchInput(NamedTuple):
     following_error: float = 0.0
     """Target less actual position in cable, of a position-controlled drive, m."""
     way: tuple[float, float] = (0.0, 0.0)
-    """Cable commanded and moved since the motion began, m, positive wound in."""
+    """Cable commanded and moved since the motion began, or rest did, m, positive wound in."""
     length: float = math.nan
     """Reading of the length instrument, m."""
     emergencies: tuple[int, ...] = ()

@@ -30,6 +30,32 @@ _NOTHING = AxisFeedback(math.nan, 0, DriveState.UNKNOWN, 0, math.nan, math.nan, 
 """Feedback of a drive that has sent nothing yet."""
 
 
+_LEAP = 2e-3
+"""Of cable from one feedback to the next, m: more is another zero, or a motion that is fast."""
+
+
+class WayAtRest:
+    """Cable that a motor has moved, in small steps, since its winch was disabled."""
+
+    def __init__(self) -> None:
+        self._angle = math.nan
+        self._way = 0.0
+
+    def moved(self, angle: float, arm: float, *, disabled: bool) -> float:
+        """Take the motor angle (rad) of a cycle, and the arm (m/rad); returns m."""
+        step = (angle - self._angle) * arm
+        self._angle = angle
+        if not disabled:
+            self._way = 0.0
+        elif abs(step) <= _LEAP:
+            self._way += step
+        return self._way
+
+    def forget(self) -> None:
+        """A reset has shown it."""
+        self._way = 0.0
+
+
 @dataclass
 class WinchParts:
     """Parts of one winch in the control loop."""
@@ -49,6 +75,7 @@ class WinchParts:
     """The cable as the profile declares it."""
     capacity: tuple[float, float] = (-math.inf, math.inf)
     """Least and greatest cable length that its drum can have paid out, m."""
+    rested: WayAtRest = field(default_factory=WayAtRest)
     _read: tuple[Any, ...] = ()
     _instruments: Mapping[str, Instrumented] = field(default_factory=dict)
 
@@ -91,6 +118,9 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     if follows and feedback is not None:
         target_speed, following_error = controller.tracking(feedback.angle, arm)
         way = controller.way(feedback.angle, arm)
+    elif feedback is not None:
+        rests = phase is Phase.DISABLED
+        way = 0.0, parts.rested.moved(feedback.angle, arm, disabled=rests)
     sensors = parts.instruments(resumed)
     heartbeat, operational = axis.heartbeat, axis.operational
     emergencies = () if fault else axis.alarms

@@ -104,6 +104,7 @@ def _record(positions: Mapping[str, KeptPosition], *, ended: bool) -> str:
             "doubt": kept.doubt,
             "closed": kept.closed,
             "serial": kept.serial,
+            "unit": kept.unit,
             "objects": [[*key, value] for key, value in kept.objects.items()],
         }
         for name, kept in positions.items()
@@ -132,5 +133,6 @@ def _kept(row: Mapping[str, Any]) -> KeptPosition:
         doubt=str(row["doubt"]),
         closed=row["closed"] is True,
         serial=int(row["serial"]),
+        unit=float(row["unit"]),
         objects={(int(i), int(sub)): int(value) for i, sub, value in row["objects"]},
     )

@@ -51,8 +51,7 @@ class RecordFile:
                 raise OSError(9, "it could not be opened")
             data = self._padded(text)
             os.lseek(self._descriptor, 0, os.SEEK_SET)
-            if os.write(self._descriptor, data) != len(data):
-                raise OSError(28, "no space left on the device")
+            _write(self._descriptor, data)
             if not self._in_place(self._descriptor):
                 # Somebody removed or replaced the file: a later process reads what has its name.
                 self._replace(text)
@@ -83,9 +82,11 @@ class RecordFile:
         data, draft = self._padded(text), f"{self.path}.{os.getpid()}"
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _FLAGS, 0o644)
         try:
-            if os.write(descriptor, data) != len(data):
-                raise OSError(28, "no space left on the device")
+            _write(descriptor, data)
             os.fsync(descriptor)
+        except OSError:
+            os.unlink(draft)
+            raise
         finally:
             os.close(descriptor)
         if sys.platform == "win32":
@@ -111,6 +112,11 @@ class RecordFile:
         if descriptor is not None:
             with suppress(OSError):
                 os.fsync(descriptor)
+
+
+def _write(descriptor: int, data: bytes) -> None:
+    if os.write(descriptor, data) != len(data):
+        raise OSError(28, "no space left on the device")
 
 
 def _sync_folder(folder: str) -> None:

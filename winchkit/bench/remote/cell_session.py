@@ -9,9 +9,11 @@ from pathlib import Path
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.cells.instruments import can_buses, instruments
 from winchkit.bench.cells.tasks import BenchCells, LocalCells
-from winchkit.bench.remote.client import RemoteCells, attach
+from winchkit.bench.remote.client import RemoteCells
+from winchkit.bench.remote.client import attach as attach_to_owner
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
+from winchkit.bench.remote.session import attach, serves
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BenchSpec
@@ -21,12 +23,15 @@ from winchkit.schema.bench import BenchSpec
 def at_cells(bench_file: str | Path) -> Iterator[BenchCells]:
     """The instruments of a bench, by its owner or as its owner.
 
-    Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client.
+    Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client, or has
+    opened the bench with other files and others use it.
     """
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench_file)
-    remote = attach(spec)
+    remote = attach_to_owner(spec)
+    if remote is not None and not serves(remote, spec):
+        remote = attach(bench_file)
     if remote is not None:
         with remote:
             yield RemoteCells(spec, remote)

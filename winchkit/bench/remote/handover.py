@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import closing, suppress
 
-from winchkit.bench.ownership import Ownership, connect_to_owner
+from winchkit.bench.ownership import Ownership, connect_to_owner, owner_name
 from winchkit.bench.remote.requests import ANSWER_TIME, Requests
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BenchSpec
@@ -49,7 +49,11 @@ def own_or_find(spec: BenchSpec, name: str) -> Ownership | None:
             return Ownership(spec, name)
         except NotPermitted:
             if time.monotonic() > deadline:
-                raise
+                raise NotPermitted(
+                    f"bench '{spec.name}' is owned by {owner_name(spec)}, which has accepted no "
+                    f"client for {_OPENING:g} s: it still opens the bench, or works on its cells "
+                    "alone; wait for it, or end it"
+                ) from None
         with suppress(ConnectionLost):
             connection = connect_to_owner(spec)
             if connection is not None:

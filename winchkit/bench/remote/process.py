@@ -37,6 +37,8 @@ _POLL = 0.02
 """s: the process ends that much later than it could."""
 _OWNED = "owned"
 """In the last line: somebody else owns the bench; attach there."""
+_DEFECT = "defect"
+"""In the last line: an exception that is no error of winchkit's own."""
 _PROGRESS = "progress"
 """In the lines before it."""
 
@@ -91,6 +93,12 @@ def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
         message = f"the bench process ended without opening the bench; see {log_path(spec)}"
         return Spawned(error=ConnectionLost(message))
     reply = json.loads(line)
+    if _DEFECT in reply:
+        message = (
+            f"the bench process failed: {reply[_DEFECT]} (a defect of winchkit, please report it "
+            f"with {log_path(spec)})"
+        )
+        return Spawned(error=WinchkitError(message))
     if "error" in reply:
         return Spawned(error=error_of(reply["error"], reply["message"]))
     return Spawned(owned=reply.get(_OWNED, False))
@@ -113,6 +121,9 @@ def main() -> None:
         except KeyboardInterrupt:
             sys.stderr.write(f"{client_name('bench')}: {interruption.words}\n")
             sys.exit(interruption.exit_code)
+        except Exception as error:
+            _report(report, {_DEFECT: f"{type(error).__name__}: {error}"})
+            raise  # its traceback is in the log
 
 
 def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:

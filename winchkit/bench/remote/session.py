@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from winchkit.arguments import path_of
-from winchkit.bench.drives.set_up_progress import tell_hardware
+from winchkit.bench.drives.set_up_progress import tell_hardware, to_stderr
 from winchkit.bench.ownership import digest_of, unless_stopped
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.client import attach as attach_to_owner
@@ -141,7 +141,7 @@ def _sought(
         late = time.monotonic() > deadline
         problem: WinchkitError | None
         station, problem = _owner(spec, name, observer=observer)
-        if station is not None and _serves(station, spec, effects, observer=observer):
+        if station is not None and serves(station, spec, effects, observer=observer):
             return station
         if station is None and problem is None:
             if not can_spawn(spec):
@@ -170,14 +170,25 @@ def _owner(
         return None, error
 
 
-def _serves(
-    station: RemoteStation, spec: BenchSpec, effects: Sequence[str], *, observer: bool
+def serves(
+    station: RemoteStation,
+    spec: BenchSpec,
+    effects: Sequence[str] = (),
+    *,
+    observer: bool = False,
 ) -> bool:
     """Whether the owner has the bench as it is asked for; else it was asked to end, or it raises.
 
-    A bench process that opened the bench before its files were changed is started anew.
+    A bench process that opened the bench before its files were changed is started anew, but for an
+    observer, to whom it is reported.
     """
-    changed = station.lends and not observer and station.digest != digest_of(spec)
+    changed = station.lends and station.digest != digest_of(spec)
+    if changed and observer and not effects:
+        to_stderr(
+            f"bench '{spec.name}' was opened by {station.owner} with other files than these: what "
+            "is shown and logged is by those; the next command that moves a winch opens it anew"
+        )
+        return True
     if not changed and not effects:
         return True
     wanted = digest_of(spec.with_effects(effects))

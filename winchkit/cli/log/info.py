@@ -62,10 +62,13 @@ def _lines(info: LogInfo) -> list[str]:
 
 
 def _source(item: SourceInfo) -> str:
+    from winchkit.runs.sanity.finding import counted
+
     parts = [f"{item.samples} samples"]
     if not math.isnan(item.rate):
         parts.append(f"{item.rate:.4g} Hz")
-    parts.append(f"{item.gaps} gaps" + (f" up to {item.longest_gap:.3g} s" if item.gaps else ""))
+    longest = f" up to {item.longest_gap:.3g} s" if item.gaps else ""
+    parts.append(f"{counted(item.gaps, 'gap')}{longest}")
     if item.missing:
         parts.append("NaN: " + ", ".join(f"{name} {n}" for name, n in item.missing.items()))
     if item.flagged:

@@ -33,5 +33,5 @@ def share(part: float) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """``1 gap``, ``3 gaps``."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    """``1 gap``, ``3 gaps``, ``no gaps``."""
+    return f"{count} {noun}" if count == 1 else f"{count or 'no'} {noun}s"

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.runs.run import Run, lost_samples
+from winchkit.runs.gaps import gap_lengths, lost_samples
+from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding, counted, share
 
 _JITTER = 0.05
@@ -22,8 +23,8 @@ def sampling(run: Run) -> Iterator[Finding]:
         return
     steps = np.diff(run.time)
     usual = float(np.median(steps))
-    lost_some = lost_samples(run.time)
-    gaps, even = steps[lost_some], steps[~lost_some]
+    even = steps[~lost_samples(run.time)]
+    gaps = np.array(gap_lengths(run.time, {name: run[name] for name in run}))
     jitter = float(np.std(even) / np.mean(even))
     if jitter > _JITTER:
         yield Finding(

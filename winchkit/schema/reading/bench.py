@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import suggest
-from winchkit.schema.bench import BenchSpec, CellWiring, latch_path
+from winchkit.schema.bench import BenchSpec, BusSpec, CellWiring, latch_path
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -211,7 +211,12 @@ def _check_references(
 ) -> None:
     """Profiles and devices exist, buses exist and fit, no two devices share an address."""
     winches, buses = tree.get("winch"), tree.get("bus")
-    taken: dict[tuple[str, str, int], str] = {}
+    known = buses if isinstance(buses, dict) else {}
+    taken: dict[tuple[str, str, int], str] = {
+        (name, "node", bus.get("node", BusSpec.node)): f"the host (bus.{name}.node)"
+        for name, bus in known.items()
+        if isinstance(bus, dict) and bus.get("kind") == "can"
+    }
     for name, winch in winches.items() if isinstance(winches, dict) else ():
         if not isinstance(winch, dict):
             continue
@@ -220,7 +225,6 @@ def _check_references(
         for role in ROLES:
             if isinstance(raw := winch.get(role), dict):
                 place: Key = (*at, role)
-                known = buses if isinstance(buses, dict) else {}
                 _check_device(reading, raw, known, place, read_device)
                 _check_address(reading, raw, place, taken)
 

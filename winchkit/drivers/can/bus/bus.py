@@ -48,7 +48,7 @@ class FrameTime:
 
     def __init__(self) -> None:
         self._offset = math.inf
-        self._last = 0.0
+        self._last = self._stamp = 0.0
         self._late_since: float | None = None
 
     def map(self, stamp: float, now: float) -> float:
@@ -56,6 +56,7 @@ class FrameTime:
         if stamp <= 0.0:
             return now
         seen, offset = now - stamp, self._offset
+        before, self._stamp = self._stamp, stamp
         if seen < offset:
             self._late_since, offset = None, seen
         elif seen - offset <= _LATE:
@@ -63,6 +64,9 @@ class FrameTime:
             # Not within a reception, whose frames have the same ``now``.
             if now > self._last:
                 offset += min(seen - offset, _DRIFT * (now - self._last))
+        elif stamp < before:
+            # Frames come in their order: the clock of the stamps was set back (NTP), or wrapped.
+            self._late_since, offset = None, seen
         elif self._late_since is None:
             self._late_since = stamp
         elif stamp - self._late_since >= _SET:

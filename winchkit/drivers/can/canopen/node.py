@@ -43,9 +43,18 @@ def sdo_client(remote: canopen.RemoteNode, clock: Clock) -> Any:
     return client
 
 
+class _NoAnswer(canopen.SdoCommunicationError):
+    """No answer within the time-out; ``after`` (s) where it came within the same time again."""
+
+    def __init__(self, after: float | None) -> None:
+        super().__init__("no answer")
+        self.after = after
+
+
 class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
     def __init__(self, request: int, reply: int, dictionary: Any, clock: Clock) -> None:
         super().__init__(request, reply, dictionary)
+        self._clock = clock
         self._arrived = event_of(clock)
         self._open = self._answered = b""
         """Index and sub-index of the request under way, and of the one answered last."""
@@ -53,6 +62,8 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
         """Command specifiers of its answer; none where any answers, such as a segment."""
         self.answered_twice = 0
         """Answers to a request that was answered: of a second node, or to another client."""
+        self.awaits_late = True
+        """Whether an answer that missed its time is waited for, to say how late it comes."""
 
     def send_request(self, request: Any) -> None:
         self._arrived.clear()
@@ -73,8 +84,12 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
         self._arrived.set()
 
     def read_response(self) -> Any:
+        asked = self._clock.now()
         if not self._arrived.wait(self.RESPONSE_TIMEOUT):
-            raise canopen.SdoCommunicationError("No SDO response received")
+            # Only a node that has answered before is waited for again: a dead one costs no more.
+            waits = self._answered and self.awaits_late
+            late = waits and self._arrived.wait(self.RESPONSE_TIMEOUT)
+            raise _NoAnswer(self._clock.now() - asked if late else None)
         return super().read_response()
 
 
@@ -208,6 +223,14 @@ class SdoNode:
         """Value of an integer object; raises NoReply, DeviceRefused."""
         return self._number(index, sub, self.upload(index, sub))
 
+    def probe(self, index: int) -> int:
+        """Read from a node that may still boot, and then answers nothing; as :meth:`read`."""
+        self._sdo.awaits_late = False
+        try:
+            return self.read(index)
+        finally:
+            self._sdo.awaits_late = True
+
     def upload(self, index: int, sub: int = 0) -> bytes:
         """Bytes of any object as the device sends them; raises NoReply, DeviceRefused."""
         with self._lock:
@@ -334,6 +357,7 @@ class SdoNode:
     def _silent(self, index: int, sub: int, error: Exception) -> ConnectionLost:
         if (duplicate := self._duplicate()) is not None:
             return duplicate
+        longer = f"sdo_timeout in [bus.{self.bus.name}] of the bench file"
         if self._other_client and self._sdo.answered_twice:
             action = "another program asks this node by SDO at the same time; end it"
         elif self.bus.nmt_state(self.node) == NmtState.STOPPED:
@@ -342,10 +366,15 @@ class SdoNode:
                 "then open the bench (winchkit monitor), which makes it pre-operational"
             )
         else:
-            action = "check power, wiring, bit rate and node id"
+            action = f"check power, wiring, bit rate and node id, and for a slow drive set {longer}"
+        within = f"{self.place(index, sub)}: no answer within {self.bus.sdo_timeout:g} s"
+        if not isinstance(error, _NoAnswer):
+            return NoReply(f"{within} ({error}); {action}")
+        if error.after is None:
+            return NoReply(f"{within}; {action}")
         return NoReply(
-            f"{self.place(index, sub)}: no answer within {self.bus.sdo_timeout:g} s ({error}); "
-            f"{action}"
+            f"{within}; it came after {error.after:.2g} s: set {longer} to twice that, "
+            f'"{2 * error.after:.2g} s"'
         )
 
 

@@ -291,7 +291,7 @@ def await_booted(
     deadline = clock.now() + boot_time
     while True:
         try:
-            node.read(0x1000)
+            node.probe(0x1000)
         except NoReply as error:
             if clock.now() >= deadline:
                 if heartbeat is not None and heartbeat.state == NmtState.STOPPED:

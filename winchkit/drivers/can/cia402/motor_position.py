@@ -24,6 +24,10 @@ Key = tuple[int, int]
 """Index and sub-index of an object."""
 
 _POSITION, _HEARTBEAT, _SERIAL = (0x6064, 0), (0x1017, 0), (0x1018, 4)
+_POLARITY, _REVERSED = (0x607E, 0), 0x80
+"""607Eh, and its bit that reverses positions (CiA 402-2)."""
+_SAME = 1e-9
+"""Relative difference of one unit, from which a change is counted: rounding is 1e-16."""
 _MAPPING, _RECORD = 0x1A00, 0x1800
 """Of TPDO 1: its mapping and its communication record."""
 _RESTARTED = "the drive has restarted, and the count of its incremental encoder began anew"
@@ -47,6 +51,8 @@ class KeptPosition:
     """1018h:4; 0 where the drive has none."""
     objects: Mapping[Key, int] = field(default_factory=dict)
     """Volatile objects as the set-up had written them."""
+    unit: float = 0.0
+    """Of a count, rad; negative where 607Eh reverses it."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,8 @@ class _ShownByDrive:
     """0 where it has none."""
     restarted: str
     """Evidence that it was switched off since the set-up before, in words."""
+    sense: int
+    """-1 where 607Eh reverses its count, else 1."""
 
 
 class MotorPosition:
@@ -77,6 +85,8 @@ class MotorPosition:
         self._standstill: Standstill | None = None
         self._boot_ups = 0
         self._angle = math.nan
+        self._unit = 0.0
+        """Of a count, rad, negative where 607Eh reverses it; 0 before it is commissioned."""
         self._kept: KeptPosition | None = None
         self._serial = 0
         self._objects: Mapping[Key, int] = {}
@@ -139,6 +149,7 @@ class MotorPosition:
             closed=closed,
             serial=self._serial,
             objects=self._objects,
+            unit=self._unit,
         )
 
     def look(self, node: SdoNode) -> None:
@@ -151,21 +162,26 @@ class MotorPosition:
             before = {} if self._kept is None else self._kept.objects
         restarted = _evidence(node, before) if before else ""
         serial = node.read_if_there(*_SERIAL) or 0
-        self._found = _ShownByDrive(node.read(*_POSITION), serial, restarted)
+        reverses = (node.read_if_there(*_POLARITY) or 0) & _REVERSED
+        sense = -1 if reverses else 1
+        self._found = _ShownByDrive(node.read(*_POSITION), serial, restarted, sense)
 
     def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
         """The counter of a drive that has been set up; a boot-up has reset it."""
         counter, found = self.counter, self._found
         assert found is not None, "the axis has looked before the set-up"
         booted = boot_ups != self._boot_ups
+        unit = found.sense * drive.scale.angle
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)
             counter = PositionCounter(low, high, self._watch.speed / drive.scale.angle)
             self._resume(counter, found, drive, booted=booted)
+        elif changed := _changed_unit(self._unit, unit):
+            counter.restart(changed)
         elif booted or found.restarted:
             evidence = _RESTARTED if booted else found.restarted
             counter.restart(evidence if self._incremental else "")
-        self._angle = drive.scale.angle
+        self._angle, self._unit = drive.scale.angle, unit
         self.counter, self._boot_ups = counter, boot_ups
         self._serial, self._objects = found.serial, dict(_written(drive))
         self._standstill = Standstill(drive.scale)
@@ -226,6 +242,10 @@ class MotorPosition:
                 f"{kept.serial}"
             )
             return
+        changed = _changed_unit(kept.unit, found.sense * drive.scale.angle) if kept else ""
+        if changed:
+            counter.doubt = changed
+            return
         counter.zero = 0 if kept is None else kept.zero
         doubt = self._break(kept, found, counter.span, drive.scale.angle, booted=booted)
         if kept is not None and (kept.doubt or not doubt):
@@ -260,6 +280,20 @@ class MotorPosition:
                 "switched off, set, or turned since"
             )
         return ""
+
+
+def _changed_unit(was: float, now: float) -> str:
+    """That a count has another size or sense than when the zero was found, in words."""
+    if not was or math.isclose(was, now, rel_tol=_SAME):
+        return ""
+    turn, before = (
+        f"{math.tau / abs(unit):.10g}{' (reversed by 607Eh)' if unit < 0 else ''}"
+        for unit in (now, was)
+    )
+    return (
+        f"a motor turn is {turn} counts of 6064h and was {before} when it was homed: its device "
+        "file was changed, or 607Eh, 608Fh, 6091h or 6092h of the drive"
+    )
 
 
 def _written(drive: Commissioned) -> Iterator[tuple[Key, int]]:

@@ -14,6 +14,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import command_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.cia402.state_machine import QUICK_STOP
 
 _NMT, _SDO_REQUEST, _HEARTBEAT = 0x000, 0x600, 0x700
 _FURTHER_SERVERS = range(0x1201, 0x1280)
@@ -25,6 +26,7 @@ _HEAD = 4
 """Bytes of an SDO request: command, index and sub-index."""
 _CONTROL_WORD = 0x6040
 """Object (CiA 402) whose writes are counted."""
+_QUICK_STOP = QUICK_STOP.to_bytes(2, "little")
 
 
 class SecondMaster:
@@ -88,7 +90,10 @@ class SecondMaster:
             index = int.from_bytes(data[1:3], "little")
             self.control_words += index == _CONTROL_WORD
             sub = f":{data[3]}" if data[3] else ""
-            self._note(f"SDO write of {index:04X}h{sub} of node {self._node} ({data.hex(' ')})")
+            stops = index == _CONTROL_WORD and data[_HEAD : _HEAD + 2] == _QUICK_STOP
+            what = ", a quick stop, as of a `winchkit stop` on the bus itself" if stops else ""
+            sent = f"{data.hex(' ')}{what}"
+            self._note(f"SDO write of {index:04X}h{sub} of node {self._node} ({sent})")
 
     def _take_nmt(self, data: bytes, _now: float) -> None:
         if len(data) > 1 and data[1] in (0, self._node):
