@@ -34,10 +34,7 @@ STRANGE = (
     pytest.param("outside-sticky-place", 302, marks=CAMPAIGN),
     pytest.param("outside-wander", 303, marks=CAMPAIGN),
 )
-NAMED_SINCE = (
-    ("outside-crosstalk", 303),
-    pytest.param("outside-clipping", 304, marks=CAMPAIGN),
-)
+NAMED_SINCE = (("outside-crosstalk", 303), pytest.param("outside-clipping", 304, marks=CAMPAIGN))
 
 
 @pytest.mark.parametrize("seed", NOTHING)
@@ -138,12 +135,7 @@ def test_what_searches_once_missed(
     ],
 )
 def test_runs_of_a_logger_with_a_fault(
-    fault: str,
-    seed: int,
-    snr: float,
-    hidden: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    fault: str, seed: int, snr: float, hidden: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Fault and effect are drawn, from as many effects as when the seed was first drawn.
     monkeypatch.setattr("campaign.logger_case.RECENT", RECENT[:8])

@@ -17,11 +17,7 @@ from scipy.stats import binom, norm, t
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.dispersion import (
-    fits_worse,
-    largest_loss,
-    overdispersed,
-)
+from winchkit.diagnosis.regression.dispersion import fits_worse, largest_loss, overdispersed
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import BandNoise

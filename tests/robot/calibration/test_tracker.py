@@ -40,10 +40,7 @@ MOVED = {
     ),
     "0.24 deg, 0.5 m and 10/26/130 mm, angles of an IMU": (
         Station(
-            0.24,
-            shift=(0.08, 0.28, 0.41),
-            reflector=(-0.01, -0.026, -0.13),
-            turns_rotation=False,
+            0.24, shift=(0.08, 0.28, 0.41), reflector=(-0.01, -0.026, -0.13), turns_rotation=False
         ),
         {"frame", "reflector"},
     ),
