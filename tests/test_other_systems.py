@@ -274,9 +274,7 @@ def test_windows_simulates_no_serial_line(monkeypatch: pytest.MonkeyPatch) -> No
         stream_line.SimulatedStreamLine((), nullcontext, float).start()
 
 
-def test_socketcan_elsewhere_names_the_adapters_interfaces(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_socketcan_elsewhere_names_the_adapters_interfaces(monkeypatch: pytest.MonkeyPatch) -> None:
     on(monkeypatch, interface, "win32")
     with pytest.raises(ConnectionLost, match="part of Linux"):
         interface.open_interface(BusSpec("can", interface="socketcan", channel="can0"), "can")

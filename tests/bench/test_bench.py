@@ -24,13 +24,7 @@ from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.bench.programme import run_programme
 from winchkit.bench.remote.client import attach
-from winchkit.errors import (
-    FileError,
-    LimitTripped,
-    MotionError,
-    NotPermitted,
-    UsageError,
-)
+from winchkit.errors import FileError, LimitTripped, MotionError, NotPermitted, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, ProgrammeStep

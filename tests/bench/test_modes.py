@@ -39,9 +39,7 @@ def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
         servo = replace(one.servo, device=str(path), node=number + 1)
         wiring[name] = replace(one, servo=servo, **units)
     return replace(
-        spiral,
-        bench=replace(spiral.bench, winch=wiring),
-        truth=dict.fromkeys(winches, truth),
+        spiral, bench=replace(spiral.bench, winch=wiring), truth=dict.fromkeys(winches, truth)
     )
 
 

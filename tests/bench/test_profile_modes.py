@@ -32,10 +32,7 @@ def test_the_drive_keeps_the_limits_that_it_is_given() -> None:
     limits = replace(limits, in_drive=True, following_error=0.05, torque=1.5)
     sim = declared(limits=limits, options=OptionSpec(quick_stop=6))
     clock = SimulatedClock()
-    with (
-        LiveBench(sim, simulated_time=clock) as live,
-        open_bench(live.bench_spec, clock) as bench,
-    ):
+    with LiveBench(sim, simulated_time=clock) as live, open_bench(live.bench_spec, clock) as bench:
         objects, winch = live.winches["A"].drive.objects, bench.winch["A"]
         turn = objects.number(0x608F, 1) / objects.number(0x608F, 2)
         low, high = (objects.number(0x607D, sub) / turn * 2 * math.pi for sub in (1, 2))

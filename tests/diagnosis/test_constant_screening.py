@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from constant_screening import (
-    associations,
-    rules_of_thumb,
-    scaled,
-    set_constants,
-    value_of,
-)
+from constant_screening import associations, rules_of_thumb, scaled, set_constants, value_of
 from winchkit.diagnosis.selection import acceptance
 from winchkit.diagnosis.verdict import laws
 

@@ -218,10 +218,7 @@ CASES: dict[str, Case] = {
     "layer-thickness": ({"thickness_error": -2e-4}, _thickness_error),
     "drum-eccentricity": ({"eccentricity": 3e-4, "phase": 0.7}, _eccentricity),
     "gear-backlash": ({"gap": 0.01, "held": 0.0}, _backlash),
-    "gear-transmission-error": (
-        {"amplitude": 3e-4, "phase": 0.4, "order": 3},
-        _transmission_error,
-    ),
+    "gear-transmission-error": ({"amplitude": 3e-4, "phase": 0.4, "order": 3}, _transmission_error),
     "encoder-slip": (
         {"step": 0.05, "time": 40.1},
         lambda: _by_angle(X.phi + 0.05 * _smooth_step((X.t - 40.1) / 0.4)),
@@ -256,10 +253,7 @@ CASES: dict[str, Case] = {
         {"coulomb": 0.02, "static": 0.05, "stribeck_speed": 0.03},
         lambda: _tension(_bearing(X.s * (0.02 + 0.03 * np.exp(-((X.v / 0.03) ** 2))))),
     ),
-    "pulley-capstan": (
-        {"friction": 0.03},
-        lambda: _tension(X.T * np.exp(0.03 * X.s * sum(WRAPS))),
-    ),
+    "pulley-capstan": ({"friction": 0.03}, lambda: _tension(X.T * np.exp(0.03 * X.s * sum(WRAPS)))),
     "pulley-inertia": ({"equivalent_mass": 0.7}, lambda: _tension(X.T + 1.4 * X.a)),
     "cable-weight": (
         {"mass_per_length": 0.2},
@@ -271,10 +265,7 @@ CASES: dict[str, Case] = {
     "cell-drift": ({"drift": 0.03}, lambda: {"tension": X.T + 0.03 * X.t}),
     "cell-thermal": ({"sensitivity": 0.4}, lambda: {"tension": X.T + 0.4 * X.warm}),
     "cell-lag": ({"time_constant": 0.1}, lambda: {"tension": _lag(X.T, 0.1, X.T[0])}),
-    "cell-hysteresis": (
-        {"fraction": 0.01},
-        lambda: {"tension": X.T - _loop(X.T, 0.01, 0.1)},
-    ),
+    "cell-hysteresis": ({"fraction": 0.01}, lambda: {"tension": X.T - _loop(X.T, 0.01, 0.1)}),
     "cell-creep": (
         {"fraction": 0.002, "time_constant": 50},
         lambda: {"tension": X.T + 0.002 * _lag(X.T, 50, 0.0)},
@@ -341,14 +332,8 @@ CASES: dict[str, Case] = {
         {"torque": 0.05, "place": 3.0, "width": 2.0},
         lambda: _torque(0.05 * X.sm * np.exp(-((X.phi - 3.0) ** 2) / 4.0)),
     ),
-    "cell-crosstalk": (
-        {"share": 3.0},
-        lambda: {"tension": X.T + 3.0 * X.T * X.arm},
-    ),
-    "cell-clipping": (
-        {"share": 1.0, "limit": 300.0},
-        lambda: {"tension": np.minimum(X.T, 300.0)},
-    ),
+    "cell-crosstalk": ({"share": 3.0}, lambda: {"tension": X.T + 3.0 * X.T * X.arm}),
+    "cell-clipping": ({"share": 1.0, "limit": 300.0}, lambda: {"tension": np.minimum(X.T, 300.0)}),
 }
 OWN_TESTS = {
     "gear-dahl",

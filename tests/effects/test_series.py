@@ -42,11 +42,7 @@ def test_a_series_in_single_orders_is_what_it_was_made_of() -> None:
     std = {"amplitude": 1e-3, "amplitude_3": 3e-3, "phase_2": 0.2}
     singles = list(single_orders(series, std))
     assert [dict(term.values) for term, _ in singles] == [dict(t.values) for t in terms()]
-    assert [own for _, own in singles] == [
-        {"amplitude": 1e-3},
-        {"phase": 0.2},
-        {"amplitude": 3e-3},
-    ]
+    assert [own for _, own in singles] == [{"amplitude": 1e-3}, {"phase": 0.2}, {"amplitude": 3e-3}]
     longer = harmonic_series([series, Term(COGGING, {**COGGING.null, "order": 84.0})])
     assert orders_of(longer) == (7, 28, 12, 84)
 

@@ -13,9 +13,7 @@ from model_lines import line_with, profile_with, swing
 from winchkit.model.derivatives import SamplingTimes, direction
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, Modifier, Signals, Stage
-from winchkit.schema.profiles.winch import (
-    ReferenceSpec,
-)
+from winchkit.schema.profiles.winch import ReferenceSpec
 from winchkit.units import GRAVITY
 
 
@@ -127,10 +125,7 @@ def test_without_a_load_the_cell_stands_in_and_nothing_before_it_can_be_seen() -
     assert np.allclose(plain["motor_torque"][::200], tension[::200] * arm)
     blind = line_with(
         bare.profile,
-        {
-            "pulley-coulomb": {"friction": 0.1},
-            "cable-weight": {"mass_per_length": 0.2},
-        },
+        {"pulley-coulomb": {"friction": 0.1}, "cable-weight": {"mass_per_length": 0.2}},
     )
     assert np.array_equal(
         blind.predict(blind.motion(signals))["motor_torque"], plain["motor_torque"]

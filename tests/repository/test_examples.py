@@ -45,6 +45,7 @@ def test_ones_own_effect_explains_what_the_catalogue_cannot() -> None:
     profile = read_profile(find("profiles", "bench-spiral"))
     known = diagnose(runs, profile).diagnosis
     assert known.verdict == "unknown"
+    assert not any(step.certain for step in known.steps)
     assert any((w.variable, w.order) == ("drum_angle", 5) for w in known.where)
     own = diagnose(runs, profile, load_catalogue([EXAMPLES / "my_effect.py"])).diagnosis
     assert own.verdict == "explained"

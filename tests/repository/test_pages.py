@@ -11,7 +11,16 @@ from pathlib import Path
 import pytest
 
 from recordings_of_others import lay_out
-from snippets import FIRST_TERMINAL, LANGUAGES, ROOT, Session, Snippet, said, snippets_of
+from snippets import (
+    FIRST_TERMINAL,
+    LANGUAGES,
+    ROOT,
+    Session,
+    Snippet,
+    first_pages,
+    said,
+    snippets_of,
+)
 
 PAGES = sorted(
     path
@@ -41,6 +50,8 @@ def sessions() -> list[object]:
     return found
 
 
+FIRST = first_pages(PAGES)
+"""The first page that runs each command of winchkit, there in a process of its own."""
 RECORDINGS = {
     "docs/tutorial/emps.md": "emps",
     "docs/tutorial/known-effect.md": "emps",
@@ -56,7 +67,8 @@ def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     if name(page) in RECORDINGS:
         lay_out(RECORDINGS[name(page)], tmp_path)
-    with Session(tmp_path) as session:
+    here = {command for command, first in FIRST.items() if first != page}
+    with Session(tmp_path, here) as session:
         for snippet in snippets_of(page):
             session.run(snippet)
 
@@ -161,6 +173,17 @@ def test_blocks_are_distinguished(tmp_path: Path) -> None:
 )
 def test_outputs_are_compared_apart_from_numbers(expected: str, printed: str, same: bool) -> None:
     assert said(expected, printed) is same
+
+
+@pytest.mark.parametrize("here", [(), ("effects",)], ids=["in a process", "in this process"])
+def test_a_wrong_answer_of_winchkit_is_noticed(here: tuple[str, ...], tmp_path: Path) -> None:
+    line = "$ winchkit effects --help\n"
+    with Session(tmp_path, here) as session:
+        session.run(Snippet(1, "console", "", f"{line}Usage...\n", ""))
+        with pytest.raises(AssertionError, match="and not"):
+            session.run(Snippet(1, "console", "", f"{line}Verdict\n", ""))
+        with pytest.raises(AssertionError, match="ends with 2"):
+            session.run(Snippet(1, "console", "", "$ winchkit effects --nothing\n", ""))
 
 
 def test_a_wrong_page_is_noticed(tmp_path: Path) -> None:

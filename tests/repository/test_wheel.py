@@ -123,7 +123,8 @@ def test_the_sdist_builds_the_same_wheel_without_git(
 
 def test_it_runs_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
     """Installed by pip with its dependencies, as by a user; skipped where pip cannot get them."""
-    python("-m", "venv", str(tmp_path / "venv"))
+    # This environment's pip installs into it, so that none has to be installed there first.
+    python("-m", "venv", "--without-pip", str(tmp_path / "venv"))
     programs = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin")
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
@@ -140,7 +141,8 @@ def test_it_runs_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
 
     # Of all that is installed, a few modules are used.
     quick = ("-q", "--disable-pip-version-check", "--no-compile")
-    installed = run("python", "-m", "pip", "install", *quick, wheel)
+    there = ("--python", str(programs / "python"))
+    installed = run(sys.executable, "-m", "pip", *there, "install", *quick, str(wheel))
     if "No matching distribution" in installed.stderr or "onnection" in installed.stderr:
         pytest.skip(f"pip cannot get the dependencies here: {installed.stderr[-200:]}")
     assert installed.returncode == 0, installed.stderr

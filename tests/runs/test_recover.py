@@ -170,9 +170,7 @@ def _joined(folder: Path, suffix: str, share: float) -> Path:
     written(folder / f"b.{suffix}", duration=2.0)
     first = (folder / f"a.{suffix}").read_bytes()
     path = folder / f"both.{suffix}"
-    path.write_bytes(
-        first[: int(share * len(first))] + (folder / f"b.{suffix}").read_bytes(),
-    )
+    path.write_bytes(first[: int(share * len(first))] + (folder / f"b.{suffix}").read_bytes())
     return path
 
 

@@ -181,10 +181,7 @@ def test_the_command_writes_runs_that_can_be_read(suffix: str, tmp_path: Path) -
     [
         (["nothing", "programme-demo"], "no simulated bench 'nothing'"),
         (["spiral-bench", "programme-dem"], "did you mean 'programme-demo'"),
-        (
-            ["spiral-bench", "programme-demo", "--hidden", "fat dum"],
-            "did you mean 'fat drum'",
-        ),
+        (["spiral-bench", "programme-demo", "--hidden", "fat dum"], "did you mean 'fat drum'"),
         (["spiral-bench", "programme-demo", "--rate", "50"], "has no unit"),
     ],
 )

@@ -51,8 +51,7 @@ def test_heartbeats_show_the_state_at_their_period() -> None:
 
 
 @pytest.mark.parametrize(
-    ("behaviour", "state"),
-    [(0, Nmt.PRE_OPERATIONAL), (1, Nmt.OPERATIONAL), (2, Nmt.STOPPED)],
+    ("behaviour", "state"), [(0, Nmt.PRE_OPERATIONAL), (1, Nmt.OPERATIONAL), (2, Nmt.STOPPED)]
 )
 def test_a_lost_heartbeat_is_reported_and_1029h_acts(behaviour: int, state: Nmt) -> None:
     wire = Wire()

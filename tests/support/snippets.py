@@ -13,7 +13,8 @@
 A block with ``title="NAME"`` is a file that the reader saves under this name. A ``console`` block
 with ``title="first terminal"`` continues while the blocks after it run. An HTML
 comment ``<!-- not run: reason -->`` before a block keeps it from being run. A session that fails
-beside a stall of this computer is skipped, with the stall (tests/conftest.py).
+beside a stall of this computer is skipped, with the stall (tests/conftest.py). A line of a command
+of winchkit that has run in a process of its own on another page is run in this process.
 """
 
 from __future__ import annotations
@@ -22,15 +23,19 @@ import csv
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
+from contextlib import chdir
 from dataclasses import dataclass
+from glob import glob
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[2]
 _FENCE = re.compile(
@@ -39,6 +44,8 @@ _FENCE = re.compile(
 )
 _NEXT = re.compile(r"^next: winchkit .*\n?", re.MULTILINE)
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?")
+_PLAIN = re.compile(r"winchkit ([\w-]+)[^|<>;&`$\\]*")
+"""A line of winchkit without a shell's redirections; its command."""
 _PATIENCE = 120
 FIRST_TERMINAL = 'title="first terminal"'
 LANGUAGES = ("console", "python", "toml", "csv", "json", "usage", "text")
@@ -104,11 +111,25 @@ def options_of(command: str) -> set[str]:
     return {name for item in found.params for name in (*item.opts, *item.secondary_opts)}
 
 
-class Session:
-    """A reader's folder and terminals; a context manager."""
+def first_pages(pages: Iterable[Path]) -> dict[str, Path]:
+    """Commands of winchkit, and the first of these pages that runs each."""
+    first: dict[str, Path] = {}
+    for page in pages:
+        for snippet in snippets_of(page):
+            for line, _ in snippet.commands if not snippet.reason else ():
+                if found := _PLAIN.fullmatch(line):
+                    first.setdefault(found[1], page)
+    return first
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+
+class Session:
+    """A reader's folder and terminals; a context manager.
+
+    ``here``: commands of winchkit that are run in this process.
+    """
+
+    def __init__(self, folder: Path, here: Container[str] = ()) -> None:
+        self._folder, self._in_this_process = folder, here
         programs = str(Path(sys.executable).parent)
         self._environment = {**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"]}
         self._beside: list[subprocess.Popen[str]] = []
@@ -137,7 +158,7 @@ class Session:
             self._begin(command, output)
         elif snippet.language == "console":
             for command, output in snippet.commands:
-                self._checked(["bash", "-c", command], output)
+                self._line(command, output)
         elif snippet.language == "toml":
             self._declared(snippet)
         elif snippet.language == "csv":
@@ -162,11 +183,11 @@ class Session:
         rows = list(csv.reader(snippet.text.splitlines()))
         assert {len(row) for row in rows} == {len(rows[0])}
         (self._folder / name).write_text(snippet.text, encoding="utf-8")
-        self._checked(["winchkit", "cell", "calibrate", "--points", name, "--yes"], "...")
+        self._line(f"winchkit cell calibrate --points {name} --yes", "...")
 
     def _checked_file(self, name: str, text: str) -> None:
         (self._folder / name).write_text(text, encoding="utf-8")
-        self._checked(["winchkit", "check", name], "...")
+        self._line(f"winchkit check {name}", "...")
 
     def _usage(self, snippet: Snippet) -> None:
         """Compare the options of a usage line with those of the commands that it names."""
@@ -178,10 +199,21 @@ class Session:
             named = set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", line))
             assert named <= known, f"{line}\nnames options that {commands} lack: {named - known}"
 
+    def _line(self, line: str, output: str) -> None:
+        found = _PLAIN.fullmatch(line)
+        if found is None or found[1] not in self._in_this_process:
+            self._checked(["bash", "-c", line], output)
+            return
+        from winchkit.cli import main
+
+        with chdir(self._folder):
+            words = [w for word in shlex.split(line)[1:] for w in sorted(glob(word)) or [word]]
+            result = CliRunner().invoke(main, words)
+        _compare(line, result.exit_code, result.output, output)
+
     def _checked(self, command: list[str], output: str) -> None:
         done = self._done(command)
-        assert done.returncode == 0, f"{command[-1]}\nends with {done.returncode}:\n{done.stdout}"
-        assert said(output, done.stdout), f"{command[-1]}\nprints\n{done.stdout}\nand not\n{output}"
+        _compare(command[-1], done.returncode, done.stdout, output)
 
     def _done(self, command: list[str]) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -216,3 +248,8 @@ class Session:
                 pytest.skip(f"no route for multicast here: {printed}")
             assert line, f"{command}\nended, having printed\n{printed}"
             printed += line
+
+
+def _compare(command: str, code: int, printed: str, output: str) -> None:
+    assert code == 0, f"{command}\nends with {code}:\n{printed}"
+    assert said(output, printed), f"{command}\nprints\n{printed}\nand not\n{output}"

@@ -49,8 +49,7 @@ def test_a_reboot_is_latched_even_while_nothing_moves() -> None:
 
 
 @pytest.mark.parametrize(
-    ("attribute", "value", "kind"),
-    [("operational", False, "nmt"), ("mode_kept", False, "mode")],
+    ("attribute", "value", "kind"), [("operational", False, "nmt"), ("mode_kept", False, "mode")]
 )
 def test_a_drive_that_changes_by_itself_stops_all(attribute: str, value: bool, kind: str) -> None:
     rig = moving_rig(LIMITS)

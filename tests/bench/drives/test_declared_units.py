@@ -18,11 +18,7 @@ _TURN = 2 * pi
     [
         ('speed_unit = "0.1 counts/s"', 10_000, 0.1 * _TURN / 10_000),
         ('speed_unit = "counts / 65536 / 1 ms"', 10_000, _TURN / 10_000 / 65.536),
-        (
-            'speed_unit = "1875 rpm / 512 / encoder"',
-            10_000,
-            1875 * _TURN / 60 / 512 / 10_000,
-        ),
+        ('speed_unit = "1875 rpm / 512 / encoder"', 10_000, 1875 * _TURN / 60 / 512 / 10_000),
         ('position_unit = "0.1 deg"\nspeed_unit = "0.1 rpm"', 3600, _TURN / 600),
     ],
 )

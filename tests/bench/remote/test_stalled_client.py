@@ -27,7 +27,7 @@ from winchkit.cli.bench.holding import hold_on
 from winchkit.cli.bench.keyboard_jog import KeyboardJog
 from winchkit.errors import MotionError, WinchkitError
 
-_EXAMPLES = int(os.environ.get("WINCHKIT_SEQUENCES", "12"))
+_EXAMPLES = int(os.environ.get("WINCHKIT_SEQUENCES", "6"))
 _DELAY, _REPEAT = 0.5, 0.033
 """Of a keyboard: until its first repeat, and between two, s."""
 _KNOWN = FIRST_PRESS + DEAD_MAN

@@ -138,10 +138,7 @@ def test_a_mode_that_the_drive_itself_lacks(tmp_path: Path) -> None:
     with served(write_bench(tmp_path)) as bench:
         supported = bench.slave.objects.get(0x6502, 0)
         bench.slave.objects.set(0x6502, 0, supported & ~(1 << 5))
-        with (
-            bench.open() as opened,
-            pytest.raises(NotPermitted, match="the drive has no mode HM"),
-        ):
+        with bench.open() as opened, pytest.raises(NotPermitted, match="the drive has no mode HM"):
             opened.winch["A"].home(35)
 
 

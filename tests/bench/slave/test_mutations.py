@@ -151,13 +151,7 @@ CASES = (
         resting({"way": (0.0, -0.0199)}),
     ),
     Case("slowing down", "", _slowing(0.1), _slowing(0.0), after=0.065),
-    Case(
-        "deviation",
-        "",
-        always(winding_speed=0.024),
-        always(winding_speed=0.026),
-        after=0.25,
-    ),
+    Case("deviation", "", always(winding_speed=0.024), always(winding_speed=0.026), after=0.25),
     Case("runaway", "", always(winding_speed=0.176), always(winding_speed=0.174), after=0.03),
     Case(
         "runaway",
@@ -173,22 +167,11 @@ CASES = (
         always(following_error=0.019),
         after=0.05,
     ),
-    Case(
-        "missing motion",
-        "",
-        always(way=(0.1, 0.043)),
-        always(way=(0.1, 0.045)),
-        after=0.25,
-    ),
+    Case("missing motion", "", always(way=(0.1, 0.043)), always(way=(0.1, 0.045)), after=0.25),
     Case(
         "missing motion", "", always(way=(-0.03, -0.003)), always(way=(-0.03, -0.005)), after=0.25
     ),
-    Case(
-        "speed",
-        "",
-        always(winding_speed=-0.361, **_SLOW),
-        always(winding_speed=-0.359, **_SLOW),
-    ),
+    Case("speed", "", always(winding_speed=-0.361, **_SLOW), always(winding_speed=-0.359, **_SLOW)),
     Case(
         "length",
         "lower",

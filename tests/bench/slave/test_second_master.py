@@ -116,18 +116,18 @@ def test_a_command_of_somebody_else_is_a_latched_trip(tmp_path: Path, name: str)
     assert seen.left <= _WITHIN
 
 
-@pytest.mark.parametrize("name", HARMLESS)
-def test_who_reads_or_speaks_to_others_is_let_be(tmp_path: Path, name: str) -> None:
+def test_who_reads_or_speaks_to_others_is_let_be(tmp_path: Path) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         key = jogging(rig, bench)
-        for _ in range(5):
-            rig.from_stranger(*HARMLESS[name])
-            rig.wait(0.02)
-        rig.wait(0.2)
-        assert not key.errors
-        assert not bench.snapshot.tripped
-        assert rig.slaves[0].power.state is State.ENABLED
+        for name, frame in HARMLESS.items():
+            for _ in range(5):
+                rig.from_stranger(*frame)
+                rig.wait(0.02)
+            rig.wait(0.2)
+            assert not key.errors, name
+            assert not bench.snapshot.tripped, name
+            assert rig.slaves[0].power.state is State.ENABLED, name
         key.release()
         rig.wait(0.5)
 

@@ -44,10 +44,7 @@ def test_a_calibration_is_read_back_as_it_was_written(tmp_path: Path) -> None:
 
 def test_tares_are_read_back_as_they_were_written(tmp_path: Path) -> None:
     taken = datetime(2026, 11, 21, 10, 51, 7, tzinfo=UTC)
-    tares = {
-        "A.cell": HostTare(97.8798, 0.0925, taken),
-        "A.length": HostTare(4.4985, 5e-5, taken),
-    }
+    tares = {"A.cell": HostTare(97.8798, 0.0925, taken), "A.length": HostTare(4.4985, 5e-5, taken)}
     book = TareBook("bench", tares)
     path = write_text(tmp_path / "bench.tares.toml", tares_toml(book))
     assert read_tares(path) == book

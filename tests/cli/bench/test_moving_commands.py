@@ -259,9 +259,7 @@ def test_a_wrong_winch_is_refused_before_its_bus_is_opened(
     assert "no winch 'C'" in result.stderr
 
 
-def test_a_dry_run_keeps_no_trip_and_shares_the_platform_among_the_winches(
-    bench: Served,
-) -> None:
+def test_a_dry_run_keeps_no_trip_and_shares_the_platform_among_the_winches(bench: Served) -> None:
     declared = read_bench(bench.file)
     assert declared.latch_file
     rehearsed = _simulated(declared, 0.4)

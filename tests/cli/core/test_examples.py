@@ -61,6 +61,17 @@ LOGGER = "t [s],pos [deg],torque [N m],F [N]\n" + "".join(
 )
 
 
+PREPARED = (
+    "winchkit sim record demo-elastic-rope programme-demo",
+    "winchkit add cable-elongation-linear --fit demo-*.csv -p bench-spiral -o better.toml",
+    "winchkit add motor-viscous --fit demo-*.csv -p better.toml -o both.toml",
+    "winchkit export demo-10kg-1.csv -o lift.mcap",
+    "winchkit import logger.csv -o imported -y --save-mapping mapping.toml",
+    *(["winchkit library index ."] if HAS_LIBRARY else []),
+)
+"""What makes the files of the others; examples among them are executed here."""
+
+
 def chosen(*groups: str) -> list[Example]:
     """Examples of these groups of commands that are executed; those of files for none."""
     found = {}
@@ -74,7 +85,9 @@ def chosen(*groups: str) -> list[Example]:
 
 def of() -> list[object]:
     return [
-        pytest.param(item, id=item.line.replace("/", "|"), marks=_marks(item)) for item in chosen()
+        pytest.param(item, id=item.line.replace("/", "|"), marks=_marks(item))
+        for item in chosen()
+        if item.line not in PREPARED
     ]
 
 
@@ -112,15 +125,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "poses.csv").write_text(csv(rows(50, 3)), encoding="utf-8")
     (folder / "more.csv").write_text(csv(rows(10, 99, noise=EXACT)), encoding="utf-8")
     with chdir(folder), served(folder, "A"):
-        lines = [
-            "winchkit sim record demo-elastic-rope programme-demo",
-            "winchkit add cable-elongation-linear --fit demo-*.csv -p bench-spiral -o better.toml",
-            "winchkit add motor-viscous --fit demo-*.csv -p better.toml -o both.toml",
-            "winchkit export demo-10kg-1.csv -o lift.mcap",
-            "winchkit import logger.csv -o imported -y --save-mapping mapping.toml",
-            *(["winchkit library index ."] if HAS_LIBRARY else []),
-        ]
-        for line in lines:
+        for line in PREPARED:
             run(line)
         Path("cut.mcap").write_bytes(Path("lift.mcap").read_bytes()[:-200])
     return folder

@@ -48,10 +48,7 @@ def with_column(name: str, cells: list[str]) -> list[str]:
 
 
 CASES: dict[str, tuple[list[str], str]] = {
-    "of the reader, with its line": (
-        edited(GOOD, 41, 3, "n/a"),
-        ":42: column 'tension' has 'n/a'",
-    ),
+    "of the reader, with its line": (edited(GOOD, 41, 3, "n/a"), ":42: column 'tension' has 'n/a'"),
     "of the whole file": ([], ": the file is empty"),
     "of what can be compared": (
         with_column("tension [N]", ["12.5"] * ROWS),

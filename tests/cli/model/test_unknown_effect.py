@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from model_files import answer, invoke, record_files
+from report_parsed import Page
 from winchkit.schema.read import read_profile
 
 
@@ -18,13 +20,25 @@ def cornered(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def unknown(cornered: list[Path]) -> dict[str, Any]:
-    return answer("diagnose", *cornered, "-p", "bench-spiral")
+def told(cornered: list[Path]) -> tuple[dict[str, Any], str]:
+    """Of one diagnosis: the JSON, as its page has it, and the text."""
+    page = cornered[0].with_name("page.html")
+    text = invoke("diagnose", *cornered, "-p", "bench-spiral", "--html", page).stdout
+    found = next(word for word in Page(page.read_text()).words if word.startswith("{"))
+    return json.loads(found), text
+
+
+@pytest.fixture(scope="module")
+def unknown(told: tuple[dict[str, Any], str]) -> dict[str, Any]:
+    return told[0]
 
 
 def test_where_an_unknown_is(unknown: dict[str, Any]) -> None:
     assert unknown["verdict"] == "unknown"
     assert unknown["steps"] == []
+    shares = [where["share"] for where in unknown["unexplained"]["where"]]
+    assert shares == sorted(shares, reverse=True)
+    assert unknown["unexplained"]["share"] > 0
     for where in unknown["unexplained"]["where"]:
         assert {"output", "variable", "share"} <= set(where)
         assert set(where) <= {"output", "variable", "share", "order", "frequency"}
@@ -33,13 +47,12 @@ def test_where_an_unknown_is(unknown: dict[str, Any]) -> None:
 
 
 def test_the_curve_is_offered_added_and_marked(
-    unknown: dict[str, Any], cornered: list[Path], tmp_path: Path
+    told: tuple[dict[str, Any], str], cornered: list[Path], tmp_path: Path
 ) -> None:
+    unknown, text = told
     offered = unknown["unexplained"]["empirical"]
     assert "empirical-motor-torque-drum-angle" in offered
-    assert (
-        f"winchkit add {offered[0]}" in invoke("diagnose", *cornered, "-p", "bench-spiral").stdout
-    )
+    assert f"winchkit add {offered[0]}" in text
     new = tmp_path / "new.toml"
     added = answer(
         "add",

@@ -243,8 +243,7 @@ def test_an_effect_of_the_user_in_the_profile_is_a_prediction() -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"),
-    [(-1.0, "inverted sign"), (1000.0, "power of ten"), (180 / pi, "degrees")],
+    ("factor", "words"), [(-1.0, "inverted sign"), (1000.0, "power of ten"), (180 / pi, "degrees")]
 )
 def test_a_length_of_another_unit_is_refused_with_its_name(factor: float, words: str) -> None:
     with pytest.raises(RunError, match=words):

@@ -16,11 +16,7 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.design.discrimination import information_of, next_runs, power_of, separation
 from winchkit.diagnosis.design.plan import inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
-from winchkit.diagnosis.design.programmes import (
-    CANDIDATE_PROGRAMMES,
-    candidates,
-    range_of_runs,
-)
+from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, candidates, range_of_runs
 from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
@@ -241,12 +237,7 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "encoder",
-    [
-        1e-4,
-        0.0,
-    ],
-    ids=["a noisy encoder", "an encoder that is still at rest"],
+    "encoder", [1e-4, 0.0], ids=["a noisy encoder", "an encoder that is still at rest"]
 )
 def test_chance_stays_what_chance_can_reach(encoder: float) -> None:
     """Of 40 candidates with one to three unknowns: decreases of χ² less their penalty."""

@@ -28,9 +28,7 @@ DRAG = term("motor-coulomb", torque=0.03)
 
 
 def problem_of(
-    terms: tuple[Term, ...],
-    masses: tuple[float, ...] = (10.0, 20.0, 30.0),
-    ride: Ride = RIDE,
+    terms: tuple[Term, ...], masses: tuple[float, ...] = (10.0, 20.0, 30.0), ride: Ride = RIDE
 ) -> TimeSeriesRegression:
     runs = [
         made(int(10 * mass) + seed, GROOVED, terms, load_mass=mass, ride=ride)

@@ -17,11 +17,7 @@ from scipy.stats import binom, norm, t
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.dispersion import (
-    fits_worse,
-    largest_loss,
-    overdispersed,
-)
+from winchkit.diagnosis.regression.dispersion import fits_worse, largest_loss, overdispersed
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import BandNoise
@@ -103,7 +99,7 @@ def rates(misfit: Misfit, separation: float, seed: int = 1) -> tuple[float, floa
 
 
 @pytest.mark.parametrize("misfit", [slow, wander])
-@pytest.mark.parametrize("separation", [2.0, 5.0, 8.0])
+@pytest.mark.parametrize("separation", [2.0, 8.0])
 def test_a_true_effect_stays_beside_a_wrong_one_at_the_nominal_rate(
     misfit: Misfit, separation: float
 ) -> None:
@@ -113,7 +109,7 @@ def test_a_true_effect_stays_beside_a_wrong_one_at_the_nominal_rate(
     assert lost_by_noise > 0.1
 
 
-@pytest.mark.parametrize("separation", [2.0, 3.0, 4.0, 6.0])
+@pytest.mark.parametrize("separation", [2.0, 3.0, 6.0])
 def test_beside_noise_alone_effects_are_distinguished_as_often(separation: float) -> None:
     lost, _, out, out_by_noise = rates(nothing, separation)
     assert lost <= binom.ppf(0.999, CASES, LEVEL) / CASES

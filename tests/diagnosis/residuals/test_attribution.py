@@ -58,10 +58,7 @@ def test_friction_at_one_place_is_located_by_place_and_direction() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("physics", "output", "variable"),
-    [
-        ("sticky pulleys", "tension", "directed_load"),
-        ("motor drag", "motor_torque", "direction"),
-    ],
+    [("sticky pulleys", "tension", "directed_load"), ("motor drag", "motor_torque", "direction")],
 )
 def test_what_changes_with_the_direction_is_attributed_to_it(
     physics: str, output: str, variable: str

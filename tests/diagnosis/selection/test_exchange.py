@@ -100,9 +100,7 @@ ONE_WAY = Ride(samples=1500, rate=25.0, period=100.0)
 
 
 @pytest.mark.parametrize("radius_error", [-1e-3, -5e-4, 1e-3])
-def test_an_equivalent_effect_is_found_though_the_others_compensate(
-    radius_error: float,
-) -> None:
+def test_an_equivalent_effect_is_found_though_the_others_compensate(radius_error: float) -> None:
     """On a grooved drum a wrong radius and a wrong ratio do the same to the last digit."""
     hidden = (
         term("drum-radius", radius_error=radius_error),

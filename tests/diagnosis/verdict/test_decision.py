@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,12 @@ def runs(
     return out
 
 
+@cache
+def dragged() -> Diagnosis:
+    """Of runs with a drag of the motor."""
+    return diagnose(runs((DRAG,)), GROOVED).diagnosis
+
+
 def strange_length(size: float) -> Array:
     """What no effect does: a wobble of the instrument at every second."""
     return size * np.asarray(np.sin(2 * np.pi * RIDE.time / 1.03) ** 3)
@@ -53,7 +60,7 @@ def test_adequate() -> None:
 
 
 def test_explained() -> None:
-    found = verdict_of(diagnose(runs((DRAG,)), GROOVED).diagnosis, "explained")
+    found = verdict_of(dragged(), "explained")
     (step,) = found.steps
     assert step.effects == ("motor-coulomb",)
     torque = found.outputs["motor_torque"]
@@ -181,8 +188,7 @@ def test_two_hidden_effects_are_both_named() -> None:
 
 
 def test_the_order_of_runs_does_not_matter() -> None:
-    given = runs((DRAG,))
-    one, other = (diagnose(order, GROOVED).diagnosis for order in (given, given[::-1]))
+    one, other = dragged(), diagnose(runs((DRAG,))[::-1], GROOVED).diagnosis
     assert one.verdict == other.verdict
     assert [s.effects for s in one.steps] == [s.effects for s in other.steps]
     value = "motor-coulomb", "torque"
@@ -191,16 +197,15 @@ def test_the_order_of_runs_does_not_matter() -> None:
 
 
 def test_a_clock_that_starts_elsewhere_changes_nothing() -> None:
-    given = runs((DRAG,))
-    later = [replace(run, time=run.time + 1000.0 * n) for n, run in enumerate(given)]
-    one, other = (diagnose(some, GROOVED).diagnosis for some in (given, later))
+    later = [replace(run, time=run.time + 1000.0 * n) for n, run in enumerate(runs((DRAG,)))]
+    one, other = dragged(), diagnose(later, GROOVED).diagnosis
     assert [s.effects for s in one.steps] == [s.effects for s in other.steps]
     for output, fitted in one.outputs.items():
         assert other.outputs[output].rms_after == pytest.approx(fitted.rms_after, rel=1e-3)
 
 
 def test_candidates_are_ranked_and_the_first_ones_fitted() -> None:
-    found = diagnose(runs((DRAG,)), GROOVED).diagnosis
+    found = dragged()
     scores = [item.score for item in found.candidates]
     assert scores == sorted(scores, reverse=True)
     assert len({item.effect for item in found.candidates}) == len(scores)

@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from winchkit.fleet.diagnosis.anova import (
-    SharedAttribution,
-    WinchErrors,
-    shared_errors,
-)
+from winchkit.fleet.diagnosis.anova import SharedAttribution, WinchErrors, shared_errors
 from winchkit.fleet.report.comparison import error_texts
 
 NAMES = "ABCDEFGH"

@@ -25,7 +25,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit import FileError, open_writer, write_run
-from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.errors import ConnectionLost
 from winchkit.fleet import diagnose_library, index_library
@@ -36,13 +35,24 @@ from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.library.sessions import WinchSession
 from winchkit.fleet.library.tasks import Outcome, Task, failed, outcome_of, stored_result
 from winchkit.runs.run import Channel, Run
-from winchkit.schema.read import read_programme, read_simbench
-from winchkit.sim.bench import hiding, profiles_of, programme_path
-from winchkit.sim.record import simulate
 
 pytest.importorskip("pyarrow")
-ROOT = Path(__file__).parents[3]
 START = datetime(2026, 1, 5, tzinfo=UTC)
+OWN = """
+import numpy as np
+from winchkit import Effect, Parameter
+from winchkit.model.stages import Stage
+
+def apply(torque, at, values):
+    return torque + values["amplitude"] * np.sin(3 * at.drum_angle)
+
+MINE = Effect(
+    id="third-harmonic", stage=Stage.MOTOR, apply=apply, outputs=("motor_torque",),
+    parameters=(Parameter("amplitude", "N m", null=0.0, typical=1e-2),), what="Mine.",
+    formula="t + a sin 3p", source="me", looks_like="A sine.", told_apart="Ask me.",
+)
+"""
+"""A user's own file of effects."""
 PARTS = ("verdict", "outputs", "steps", "candidates", "unexplained", "caveats", "notes")
 
 
@@ -127,27 +137,36 @@ def test_the_list_of_a_library_has_the_verdict_of_every_run(
     assert all("explained" in line for line in listed())
 
 
-def test_a_fleet_of_axes_is_diagnosed_and_its_history_fitted(tmp_path: Path) -> None:
-    (tmp_path / "elbow.toml").write_text('schema = 1\nkind = "axis"\n')
-    library, viscosity, ticks = tmp_path / "runs", 0.04, np.arange(0.0, 6.0, 0.01)
+VISCOSITY = 0.04
+"""Of the elbows, N m s/rad."""
+
+
+def elbows(library: Path) -> None:
+    """Two axes with viscous friction, two sessions of two runs each."""
+    ticks = np.arange(0.0, 6.0, 0.01)
     for seed, (winch, day) in enumerate((w, d) for w in ("e1", "e2") for d in (1, 1, 8, 8)):
         speed = 2.0 * np.sin(2.0 * ticks) + np.cos(5.0 * ticks)
-        torque = viscosity * speed + np.random.default_rng(seed).normal(0.0, 1e-3, ticks.size)
+        torque = VISCOSITY * speed + np.random.default_rng(seed).normal(0.0, 1e-3, ticks.size)
         path = library / winch / f"2026-03-{day:02d}" / f"{seed}.csv"
         path.parent.mkdir(parents=True, exist_ok=True)
         angle = 1.0 - np.cos(2.0 * ticks) + 0.2 * np.sin(5.0 * ticks)
         channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
         write_run(Run("x", ticks, channels, {}), path)
     index_library(library)
-    profile = tmp_path / "elbow.toml"
+
+
+def test_a_fleet_of_axes_is_diagnosed_and_its_history_fitted(tmp_path: Path) -> None:
+    (tmp_path / "elbow.toml").write_text('schema = 1\nkind = "axis"\n')
+    library, profile = tmp_path / "runs", tmp_path / "elbow.toml"
+    elbows(library)
     report = diagnose_library(library, profile, jobs=1)
     assert (report.diagnosed, report.failures) == (4, {})
     estimates = Partitions(library).read("estimates", ("effect", "value", "kind")).to_pylist()
     named = [row["value"] for row in estimates if row["effect"] == "motor-viscous"]
-    assert named == pytest.approx([viscosity] * 4, rel=0.02)
+    assert named == pytest.approx([VISCOSITY] * 4, rel=0.02)
     history = library_history(library, profile, effects=["motor-viscous"])
     (found,) = history.history.parameters
-    assert found.common == pytest.approx(viscosity, rel=0.02)
+    assert found.common == pytest.approx(VISCOSITY, rel=0.02)
     assert history.failures == {}
 
 
@@ -382,27 +401,22 @@ def test_processes_with_a_user_effect_give_the_rows_of_the_plain_loop_byte_for_b
     tmp_path: Path,
 ) -> None:
     pytest.importorskip("distributed")
-    bench = hiding(read_simbench(find("sim", "demo-adequate")), ["stretched cell, gain_error=3 %"])
-    programme = read_programme(programme_path("programme-demo"))
-    for day in ("2026-03-01", "2026-03-08"):
-        place = tmp_path / "1" / "A" / day
-        place.mkdir(parents=True)
-        for number, run in enumerate(simulate(bench, profiles_of(bench), programme, rate=10.0)):
-            write_run(run, place / f"{number}.csv")
-    index_library(tmp_path / "1")
+    elbows(tmp_path / "1")
     shutil.copytree(tmp_path / "1", tmp_path / "2")
+    (tmp_path / "own.py").write_text(OWN, "utf-8")
     # A profile with an effect that only the user's file knows: a worker without it cannot read it.
-    profile = tmp_path / "own.toml"
-    effect = '[[effect]]\nid = "drum-corners"\namplitude = "0.1 mm"\n'
-    profile.write_text(find("profiles", "bench-spiral").read_text("utf-8") + effect, "utf-8")
-    (reason, _) = diagnose_library(tmp_path / "1", profile, jobs=1).failures.values()
-    assert "drum-corners" in reason
+    profile = tmp_path / "elbow.toml"
+    effect = '[[effect]]\nid = "third-harmonic"\namplitude = "5 mN m"\n'
+    profile.write_text('schema = 1\nkind = "axis"\n' + effect, "utf-8")
+    (reason, *_) = diagnose_library(tmp_path / "1", profile, jobs=1).failures.values()
+    assert "third-harmonic" in reason
     found = []
     for jobs in (1, 2):
-        folder, file = tmp_path / str(jobs), ROOT / "examples" / "my_effect.py"
-        report = diagnose_library(folder, profile, effects=[file], jobs=jobs)
-        assert (report.diagnosed, dict(report.failures)) == (2, {})
+        folder = tmp_path / str(jobs)
+        report = diagnose_library(folder, profile, effects=[tmp_path / "own.py"], jobs=jobs)
+        assert (report.diagnosed, dict(report.failures)) == (4, {})
         tables = [Partitions(folder).read(table) for table in ("diagnoses", "estimates")]
         found.append([sorted(map(repr, table.to_pylist())) for table in tables])
     assert found[0] == found[1]
     assert all(found[0])
+    assert "third-harmonic" in found[0][1][0] + found[0][0][0]

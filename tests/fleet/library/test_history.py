@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-import fleet_campaign
 from winchkit import write_run
 from winchkit.catalog import find
 from winchkit.cli import main
@@ -97,41 +96,34 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(main, ["fleet", "trend", *map(str, arguments)])
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two winches over six weeks; the load cell of the first is 3 % off from the fourth on."""
-    folder = tmp_path_factory.mktemp("library")
-    fleet = fleet_campaign.draw_fleet(5, 6, 4, {k.effect: 1e-9 for k in fleet_campaign.KINDS})
-    names = [n for n in fleet.radii if n not in (fleet.creeping, fleet.odd, *fleet.swapped)]
-    names = [*names, fleet.odd]
-    for session in fleet.sessions:
-        if session.winch not in names:
-            continue
-        off = 0.03 if session.winch == names[0] and session.number >= 3 else 0.0
-        values = {**session.values, "cell-gain": off}
-        runs, _ = fleet_campaign.runs_of(replace(session, values=values))
-        day = START + session.number * WEEK
-        place = folder / session.winch / day.date().isoformat()
-        place.mkdir(parents=True)
-        for number, one in enumerate(runs):
-            started = (day + timedelta(minutes=number)).isoformat()
-            about = {**one.metadata, "started": started}
-            write_run(replace(one, metadata=about), place / f"{one.name}-{number}.csv")
-    index_library(folder)
-    return folder
-
-
-@pytest.mark.slow
-def test_a_step_is_found_and_dated_on_the_command_line(library: Path) -> None:
-    profile = find("profiles", "bench-spiral")
-    result = run(library, "-p", profile, "--effect", "cell-gain", "--json")
+def test_a_step_is_found_and_dated_on_the_command_line(tmp_path: Path) -> None:
+    """Two axes over six weeks; the viscous friction of the first is greater from the fourth on."""
+    library, ticks, random = (
+        tmp_path / "library",
+        np.arange(0.0, 6.0, 0.01),
+        np.random.default_rng(4),
+    )
+    speed = 2.0 * np.sin(2.0 * ticks) + np.cos(5.0 * ticks)
+    angle = 1.0 - np.cos(2.0 * ticks) + 0.2 * np.sin(5.0 * ticks)
+    for winch, week, number in product(("e1", "e2"), range(6), range(2)):
+        viscosity = 0.05 if winch == "e1" and week >= 3 else 0.04
+        torque = viscosity * speed + random.normal(0.0, 1e-3, ticks.size)
+        channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+        started = START + week * WEEK + timedelta(minutes=number)
+        place = library / winch / started.date().isoformat() / f"{number}.csv"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write_run(Run("x", ticks, channels, {"started": started.isoformat()}), place)
+    index_library(library)
+    profile = tmp_path / "elbow.toml"
+    profile.write_text('schema = 1\nkind = "axis"\n')
+    result = run(library, "-p", profile, "--effect", "motor-viscous", "--json")
     assert result.exit_code == 1, result.output
     found = json.loads(result.stdout)
-    assert (found["effects"], found["sessions"]) == (["cell-gain"], 12)
+    assert (found["effects"], found["sessions"]) == (["motor-viscous"], 12)
     (parameter,) = found["parameters"]
     changed = [winch for winch in parameter["winches"] if winch["changed"]]
     assert len(changed) == 1
-    assert changed[0]["change"]["size"] == pytest.approx(0.03, abs=0.003)
+    assert changed[0]["change"]["size"] == pytest.approx(0.01, abs=0.001)
     edge = (START + 2.5 * WEEK).timestamp()
     assert abs(changed[0]["change"]["date"] - edge) <= WEEK.total_seconds()
 

@@ -40,10 +40,7 @@ def test_without_noise_there_is_no_ladder_and_errors_are_compared_with_signals()
 
 
 def test_the_page_over_all_winches_draws_each_and_keeps_names_as_text() -> None:
-    found = {
-        "A": diagnosis_of("explained", ELASTIC),
-        HOSTILE: diagnosis_of("adequate"),
-    }
+    found = {"A": diagnosis_of("explained", ELASTIC), HOSTILE: diagnosis_of("adequate")}
     pages = dict.fromkeys(found, "own.html")
     page = Page(shared_effects_html(found, [], {}, "x", pages))
     assert set(page.shown) == page.figures.keys() == {"errors-cable_length", "errors-tension"}

@@ -117,10 +117,7 @@ def test_a_geometry_is_one_step_without_values() -> None:
 
 def _friction_refitted(torque: float, std: float, share: float) -> Step:
     """A refit of a Coulomb friction of 20 mN m, whose reversal is rounded in the runs."""
-    values = {
-        "torque": Estimate(torque, std, "N m"),
-        "transition": Estimate(0.199, 0.010, "rad/s"),
-    }
+    values = {"torque": Estimate(torque, std, "N m"), "transition": Estimate(0.199, 0.010, "rad/s")}
     old = {"torque": 0.020, "transition": 0.0}
     name = "motor-coulomb"
     return Step((name,), {name: values}, 0.5, share=share, refitted=True, file_values=old)

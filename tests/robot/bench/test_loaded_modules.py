@@ -9,6 +9,7 @@ import pytest
 
 SCRIPT = """
 import sys
+from dataclasses import replace
 from winchkit import open_bench
 from winchkit.catalog import find
 from winchkit.schema.read import read_simbench
@@ -17,6 +18,7 @@ from winchkit.sim.live.bench import LiveBench
 
 clock = SimulatedClock()
 sim = read_simbench(find("sim", "cabtive-robot"))
+sim = replace(sim, bench=replace(sim.bench, cycle=0.04))
 with LiveBench(sim, simulated_time=clock) as live, open_bench(live.bench_spec, clock) as bench:
     before = set(sys.modules)
     goal = bench.robot.moved({"x": 0.005, "yaw": 0.01}, relative=True)

@@ -184,9 +184,7 @@ def test_winding_is_the_drums_own_at_any_radius_and_growth(
     for i, drum in enumerate(DRUMS):
         layered = drum.kind in {"spiral", "archimedean"}
         changed = replace(
-            drum,
-            winding_radius=float(radius[i]),
-            layer_growth=growth if layered else None,
+            drum, winding_radius=float(radius[i]), layer_growth=growth if layered else None
         )
         law, home = drum_of(winch(changed)), np.asarray(2 * np.pi * 4.2)
         turned = -(angle - 0.7) / 3.0

@@ -32,10 +32,7 @@ def dense(found: Calibrated) -> tuple[Array, Array]:
     for pose in range(poses):
         by_pose[pose, :, pose] = stack.by_pose[pose]
     matrix = np.hstack(
-        [
-            by_values.reshape(poses * equations, count),
-            by_pose.reshape(poses * equations, 6 * poses),
-        ]
+        [by_values.reshape(poses * equations, count), by_pose.reshape(poses * equations, 6 * poses)]
     )
     known = stack.known.ravel()
     priors = np.hstack([np.eye(count), np.zeros((count, 6 * poses))])

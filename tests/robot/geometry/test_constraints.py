@@ -26,14 +26,8 @@ from winchkit.robot.calibration.options import Options
 from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
 from winchkit.robot.forces.balance import force_basis
 from winchkit.robot.geometry.constraints import mean_offset
-from winchkit.robot.geometry.pose_estimation import (
-    Iteration,
-    estimated_pose,
-    moved_pose,
-)
-from winchkit.robot.geometry.pose_estimation import (
-    start_pose as completed,
-)
+from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose, moved_pose
+from winchkit.robot.geometry.pose_estimation import start_pose as completed
 from winchkit.robot.identification.bundle_adjustment import BundleState
 from winchkit.robot.identification.equations import KINDS, RobotEquations
 from winchkit.robot.identification.pose_design import (

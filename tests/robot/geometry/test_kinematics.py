@@ -67,10 +67,7 @@ def test_lengths_are_those_of_the_tangent(seed: int) -> None:
         for i in range(4):
             anchor = poses.position[p] + poses.rotation[p] @ geometry.anchor_point[i]
             expected = tangent_by_search(
-                geometry.exit_point[i],
-                geometry.swivel_axis[i],
-                geometry.swivel_radius[i],
-                anchor,
+                geometry.exit_point[i], geometry.swivel_axis[i], geometry.swivel_radius[i], anchor
             )
             assert found[p, i] == pytest.approx(expected, abs=1e-10)
 
@@ -165,8 +162,7 @@ def differences(quantity: object, geometry: Geometry, poses: object) -> Sensitiv
         )
     )
     return Sensitivities(
-        *(np.stack([by(kind, k) for k in range(3)], axis=-1) for kind in kinds),
-        radius / (2 * STEP),
+        *(np.stack([by(kind, k) for k in range(3)], axis=-1) for kind in kinds), radius / (2 * STEP)
     )
 
 

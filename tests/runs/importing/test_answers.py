@@ -61,8 +61,7 @@ def test_a_comma_that_may_separate_thousands_is_refused() -> None:
 
 def test_options_of_a_question_answer_it() -> None:
     found = with_options(
-        Answers(),
-        ('--signed "a b" --signed "c"', '--modulo "p=65536"', "--orientation vector"),
+        Answers(), ('--signed "a b" --signed "c"', '--modulo "p=65536"', "--orientation vector")
     )
     expected = Answers(signed=("a b", "c"), modulo=(("p", 65536.0),), orientation="vector")
     assert found == expected

@@ -62,9 +62,7 @@ CELLS = st.sampled_from(
 )
 LINES = st.lists(CELLS, min_size=0, max_size=6)
 SETTINGS = settings(
-    max_examples=150,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

@@ -213,18 +213,10 @@ def test_an_archive_of_other_files_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("module", "content", "extra"),
-    [
-        ("openpyxl", None, "xlsx"),
-        ("h5py", source._HDF5, "hdf5"),
-        ("pyarrow", b"PAR1", "parquet"),
-    ],
+    [("openpyxl", None, "xlsx"), ("h5py", source._HDF5, "hdf5"), ("pyarrow", b"PAR1", "parquet")],
 )
 def test_a_missing_library_is_named_with_its_extra(
-    module: str,
-    content: bytes | None,
-    extra: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    module: str, content: bytes | None, extra: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "log"
     if content is None:

@@ -674,10 +674,7 @@ def test_a_channel_that_one_winch_does_not_have_is_asked_for_no_other(tmp_path: 
 def test_the_torque_of_a_brake_or_of_the_load_is_not_the_motors(name: str, tmp_path: Path) -> None:
     m = motion()
     columns = {"time [s]": m.time, "angle [rad]": m.angle, f"{name} [Nm]": m.torque}
-    assert {i.channel for i in guess(tmp_path / "log.csv", columns).used} == {
-        "time",
-        "motor_angle",
-    }
+    assert {i.channel for i in guess(tmp_path / "log.csv", columns).used} == {"time", "motor_angle"}
 
 
 def test_a_first_column_that_seldom_changes_is_no_clock(tmp_path: Path) -> None:

@@ -464,10 +464,7 @@ def test_a_jerk_is_no_spike() -> None:
 
 def _with_velocity(angle: Array, velocity: Array) -> list[str]:
     time = np.arange(len(angle)) / RATE
-    channels = {
-        "motor_angle": Channel(angle, "rad"),
-        "motor_velocity": Channel(velocity, "rad/s"),
-    }
+    channels = {"motor_angle": Channel(angle, "rad"), "motor_velocity": Channel(velocity, "rad/s")}
     findings = inspect_run(Run("r", time, channels)).findings
     return [f.code for f in findings if f.channel == "motor_velocity"]
 

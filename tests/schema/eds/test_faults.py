@@ -142,6 +142,15 @@ def test_a_value_of_one_node_stands_against_a_default_of_any(
     assert all(said in fault.message for fault in warnings)
 
 
+def test_every_reader_has_a_dictionary_of_its_own_of_the_file_as_it_is_now(tmp_path: Path) -> None:
+    first, _ = read_eds(written(tmp_path, GOOD), 5)
+    del first[0x1014]
+    assert 0x1014 in read_eds(written(tmp_path, GOOD), 5)[0]
+    assert "VendorNumber=0x12\n" in GOOD
+    changed = GOOD.replace("VendorNumber=0x12\n", "VendorNumber=0x13\n")
+    assert read_eds(written(tmp_path, changed), 5)[0].device_information.vendor_number == 0x13
+
+
 def test_the_same_section_twice_counts_once(tmp_path: Path) -> None:
     section = GOOD[GOOD.index("[1001]") : GOOD.index("[1018]")]
     text = GOOD + section

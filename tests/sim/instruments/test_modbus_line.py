@@ -72,10 +72,7 @@ def test_the_manuals_bytes_over_a_plain_socket(served: Line) -> None:
     with socket.create_connection(served.line.address, 2.0) as wire:
         wire.sendall(bytes.fromhex("002a 0000 0006 01 03 0006 0007"))
         answer = wire.recv(256)
-    head, status, gross, net, _peak = (
-        answer[:9],
-        *struct.unpack(">HIII", answer[9:23]),
-    )
+    head, status, gross, net, _peak = (answer[:9], *struct.unpack(">HIII", answer[9:23]))
     assert head == bytes.fromhex("002a 0000 0011 01 03 0e")
     assert (gross, net) == (25_000, 25_000)
     assert not status & (1 << 7)

@@ -28,9 +28,7 @@ class SdoServer:
     """Answers one client; ``upload`` and ``download`` raise Abort."""
 
     def __init__(
-        self,
-        upload: Callable[[int, int], bytes],
-        download: Callable[[int, int, bytes], None],
+        self, upload: Callable[[int, int], bytes], download: Callable[[int, int, bytes], None]
     ) -> None:
         self._upload, self._download = upload, download
         self._transfer: _Transfer | None = None

@@ -14,12 +14,7 @@ from typing import Any
 
 _POWER_OFF = 0x4321FEDC
 _FINIT_MODULE = 313
-_MOUNTS = (
-    ("proc", "/proc"),
-    ("sysfs", "/sys"),
-    ("devtmpfs", "/dev"),
-    ("tmpfs", "/run"),
-)
+_MOUNTS = (("proc", "/proc"), ("sysfs", "/sys"), ("devtmpfs", "/dev"), ("tmpfs", "/run"))
 _MODULES = (
     "net/can/can.ko",
     "net/can/can-raw.ko",

@@ -33,10 +33,7 @@ _WAKE = 0.5
 
 
 def main(folder: Path, *, whole: bool) -> int:
-    os.environ |= {
-        "WINCHKIT_TEST_CAN": CHANNEL,
-        "WINCHKIT_TEST_SEEN": str(folder / "seen.log"),
-    }
+    os.environ |= {"WINCHKIT_TEST_CAN": CHANNEL, "WINCHKIT_TEST_SEEN": str(folder / "seen.log")}
     with (folder / "candump.log").open("wb") as log:
         # -d reports frames that it lost, -L is its log format.
         witness = subprocess.Popen(["candump", "-d", "-L", "-r", "4000000", CHANNEL], stdout=log)

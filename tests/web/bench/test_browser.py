@@ -20,10 +20,7 @@ from robot_poses.truth import Truth, csv, poses
 from winchkit.runs.writer import write_run
 from winchkit.web.examples import example_runs
 
-pytestmark = [
-    pytest.mark.slow,
-    NEEDS_CHROMIUM,
-]
+pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 
 
 @pytest.fixture(scope="module")

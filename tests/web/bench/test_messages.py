@@ -198,11 +198,7 @@ def right(asked: Mapping[str, Any]) -> bool:
     right_ones=st.sets(st.sampled_from(FIELDS)),
 )
 def test_only_whole_messages_of_finite_numbers_reach_the_station(
-    view: BenchView,
-    loop: asyncio.Runner,
-    do: str,
-    given: dict[str, Any],
-    right_ones: set[str],
+    view: BenchView, loop: asyncio.Runner, do: str, given: dict[str, Any], right_ones: set[str]
 ) -> None:
     good = {"winch": "A", "speed": 0.05, "to": 2.5, "change": -0.01, "axis": "z"}
     asked = {"do": do, **given, **{key: good[key] for key in right_ones}, "seen": 1.0}

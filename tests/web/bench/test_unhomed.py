@@ -37,8 +37,7 @@ def test_no_jog_is_offered_and_the_page_says_why(browser: Any, unhomed: Served) 
     page, complaints = opened(browser, "about:blank")
     sent: list[dict[str, Any]] = []
     page.on(
-        "websocket",
-        lambda line: line.on("framesent", lambda text: sent.append(json.loads(text))),
+        "websocket", lambda line: line.on("framesent", lambda text: sent.append(json.loads(text)))
     )
     page.goto(f"{unhomed.url}#bench")
     until(page, lambda: page.locator("#values .value").count() == 3)

@@ -19,7 +19,7 @@ import numpy as np
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
 from winchkit.robot.diagnosis.dataset import RobotDataset
-from winchkit.robot.effects.term import robot_with_terms
+from winchkit.robot.effects.term import modified_by_terms
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of
 from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, solve
@@ -77,9 +77,13 @@ class LinearizationPoint:
         """Robot profile with the geometry at its present values."""
         return self.equations.profile_at(self.state.values)
 
+    @cached_property
+    def _nominal(self) -> Robot:
+        return robot_of(self.profile)
+
     def robot(self, terms: Sequence[Term] = ()) -> Robot:
         """Robot model with effects, at the present geometry."""
-        return robot_with_terms(self.profile, terms)
+        return modified_by_terms(self._nominal, terms)
 
 
 def free_geometry(parameters: Parameters, lines: Sequence[str]) -> tuple[GeometryNumber, ...]:

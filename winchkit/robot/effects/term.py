@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from winchkit.effects.placement import HOME, line_of_effect
 from winchkit.effects.term import Term
 from winchkit.model.stages import Modifier, Stage
-from winchkit.robot.geometry.robot import Robot, robot_of
+from winchkit.robot.geometry.robot import Robot, modified, robot_of
 from winchkit.schema.profiles.robot import RobotProfile
 
 
@@ -26,7 +26,12 @@ def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
     Robot
         Kinematic model.
     """
-    lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
+    return modified_by_terms(robot_of(profile), terms)
+
+
+def modified_by_terms(nominal: Robot, terms: Iterable[Term]) -> Robot:
+    """The robot without effects, with these."""
+    lines: dict[str, list[Modifier]] = {name: [] for name in nominal.names}
     payload: list[Modifier] = []
     tracker: list[Modifier] = []
     for term in terms:
@@ -41,7 +46,7 @@ def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
             lines[name].append(modifier)
             if offset := term.values.get(HOME + name):
                 lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
-    return robot_of(profile, list(lines.values()), payload, tracker)
+    return modified(nominal, list(lines.values()), payload, tracker)
 
 
 class _Longer:

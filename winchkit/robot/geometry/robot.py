@@ -90,6 +90,11 @@ class Robot:
             )
         )
 
+    @cached_property
+    def _rest(self) -> At:
+        """A line at rest: effects of place do not depend on motion, and one serves all."""
+        return standing(Line(self.winches[0]), np.zeros(1))
+
     @property
     def dead_length(self) -> Array:
         """Stressed cable between drum and exit point, (n,), m."""
@@ -310,16 +315,28 @@ def robot_of(
         Kinematic model of the robot.
     """
     require_type(profile, RobotProfile, "profile")
-    home, geometry = home_of(profile), geometry_of(profile)
-    shown = _tracker(profile, tracker)
-    own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)
+    home, geometry, shown = home_of(profile), geometry_of(profile), declared_tracker(profile)
+    there = lengths(geometry, home.position, home.rotation)[0]
+    none, seen = ((),) * len(profile.line), None if shown.is_trivial else shown
+    nominal = Robot(profile, geometry, home, there, profile.platform, none, seen)
+    return modified(nominal, modifiers, payload, tracker)
+
+
+def modified(
+    nominal: Robot,
+    modifiers: Sequence[Sequence[Modifier]] = (),
+    payload: Sequence[Modifier] = (),
+    tracker: Sequence[Modifier] = (),
+) -> Robot:
+    """A robot without modifiers, with these; the same as :func:`robot_of` of its profile."""
+    profile, geometry, home = nominal.profile, nominal.geometry, nominal.home
+    own = tuple(tuple(m) for m in modifiers) or nominal.modifiers
+    shown = _tracker(nominal, tracker) if tracker else nominal.tracker
     if not any(own) and not payload:
-        there = lengths(geometry, home.position, home.rotation)[0]
-        return Robot(profile, geometry, home, there, profile.platform, own, shown)
+        return replace(nominal, tracker=shown)
     exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
     radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
-    # Effects of place do not depend on motion: one line at rest serves all.
-    rest = standing(Line(_winches(profile)[0]), np.zeros(1))
+    rest = nominal._rest
     for i, stages in enumerate(own):
         place, offset = LinePlace(exits[i], anchors[i], float(radii[i])), 0.0
         for modifier in stages:
@@ -338,13 +355,11 @@ def robot_of(
     return Robot(profile, geometry, home, there, platform, lines, shown)
 
 
-def _tracker(profile: RobotProfile, modifiers: Sequence[Modifier]) -> Tracker | None:
-    """The tracker of a robot's file with its effects; None where it shows the pose itself."""
-    found = declared_tracker(profile)
-    if modifiers:
-        rest = standing(Line(_winches(profile)[0]), np.zeros(1))
-        for modifier in sorted(modifiers, key=lambda m: m.order):
-            found = modifier.apply(found, rest)
+def _tracker(nominal: Robot, modifiers: Sequence[Modifier]) -> Tracker | None:
+    """The tracker of a robot's file with effects; None where it shows the pose itself."""
+    found = declared_tracker(nominal.profile)
+    for modifier in sorted(modifiers, key=lambda m: m.order):
+        found = modifier.apply(found, nominal._rest)
     return None if found.is_trivial else found
 
 

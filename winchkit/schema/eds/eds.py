@@ -8,9 +8,12 @@ in one error.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 
 from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
@@ -35,7 +38,7 @@ class EdsText:
     path: str
     text: str
     warnings: tuple[Fault, ...]
-    lines: dict[tuple[int, int | None], int]
+    lines: Mapping[tuple[int, int | None], int]
     """Line of the section of each object and sub-index."""
 
 
@@ -45,8 +48,14 @@ def read_eds_text(path: str | Path) -> EdsText:
     Returns: valid text, and a warning per repair. Raises FileError with every line that cannot be
     repaired.
     """
-    findings = EdsFindings(str(path))
-    sections = _sections(_text(Path(path), findings), findings)
+    return _parsed(str(path), _bytes(Path(path)))
+
+
+@lru_cache(maxsize=32)
+def _parsed(path: str, data: bytes) -> EdsText:
+    """Text of a file: a bench reads that of a drive once for each of its winches."""
+    findings = EdsFindings(path)
+    sections = _sections(_text(path, data, findings), findings)
     if findings.faults:
         raise FileError(findings.faults)
     mended = mend(sections, findings)
@@ -57,10 +66,10 @@ def read_eds_text(path: str | Path) -> EdsText:
         for one in mended
         if one.index is not None and not one.names_subs
     }
-    return EdsText(str(path), _written(mended), tuple(findings.warnings), lines)
+    return EdsText(path, _written(mended), tuple(findings.warnings), MappingProxyType(lines))
 
 
-def _text(path: Path, findings: EdsFindings) -> str:
+def _bytes(path: Path) -> bytes:
     try:
         with open(path, "rb", opener=regular) as stream:
             data = stream.read(_LARGEST + 1)
@@ -69,9 +78,13 @@ def _text(path: Path, findings: EdsFindings) -> str:
     if len(data) > _LARGEST:
         reason = f"larger than {_LARGEST / 1e6:g} MB, so it is not an EDS"
         raise FileError(Fault(reason, str(path)))
+    return data
+
+
+def _text(path: str, data: bytes, findings: EdsFindings) -> str:
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        raise FileError(Fault("is binary, not the text of an EDS", str(path), line))
+        raise FileError(Fault("is binary, not the text of an EDS", path, line))
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -262,15 +262,20 @@ class ObjectDictionary:
 
 def read_eds(path: Path, node: int) -> dict[Key, Entry]:
     """Objects that an EDS or DCF file declares for a node id; FileError for any other file."""
+    text = read_eds_text(path).text
+    try:
+        return dict(_declared(text, node))
+    except (ValueError, KeyError, configparser.Error) as error:
+        raise FileError(Fault(f"cannot be read as an EDS: {error}", str(path))) from error
+
+
+@lru_cache(maxsize=32)
+def _declared(text: str, node: int) -> dict[Key, Entry]:
     import_python_can()  # canopen imports it
     from canopen.objectdictionary import eds
 
     library: Any = eds
-    text = read_eds_text(path).text
-    try:
-        declared = library.import_eds(io.StringIO(text), node)
-    except (ValueError, KeyError, configparser.Error) as error:
-        raise FileError(Fault(f"cannot be read as an EDS: {error}", str(path))) from error
+    declared = library.import_eds(io.StringIO(text), node)
     entries: dict[Key, Entry] = {}
     for thing in declared.values():
         members = [thing] if not hasattr(thing, "subindices") else thing.subindices.values()

@@ -88,10 +88,7 @@ def test_frames_of_a_real_socket_have_the_time_stamp_of_the_kernel() -> None:
 
 @pytest.mark.parametrize(("flags", "ours"), [(0x800, True), (0x4, False), (0x0, False)])
 def test_a_frame_that_this_socket_has_sent_is_marked_by_linux(
-    ends: tuple[SocketCan, socket.socket],
-    flags: int,
-    ours: bool,
-    monkeypatch: pytest.MonkeyPatch,
+    ends: tuple[SocketCan, socket.socket], flags: int, ours: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """MSG_CONFIRM: of this socket; MSG_DONTROUTE: of another one of this computer."""
     port, other = ends

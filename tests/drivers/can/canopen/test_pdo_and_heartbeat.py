@@ -46,12 +46,7 @@ def test_layout_is_little_endian_in_the_order_of_the_mapping(
 
 
 @pytest.mark.parametrize(
-    "objects",
-    [
-        [],
-        [MappedObject(0x6064, 0, 32, True)] * 3,
-        [MappedObject(0x1008, 0, 24, False)],
-    ],
+    "objects", [[], [MappedObject(0x6064, 0, 32, True)] * 3, [MappedObject(0x1008, 0, 24, False)]]
 )
 def test_mappings_that_no_frame_can_carry_are_refused(objects: list[MappedObject]) -> None:
     with pytest.raises(FileError, match="PDO 2"):

@@ -67,9 +67,7 @@ FEEDBACK = st.tuples(
 
 @given(sequence=st.lists(FEEDBACK, max_size=40))
 @settings(max_examples=300)
-def test_a_motor_stands_still_by_the_plain_rule(
-    sequence: list[tuple[float, float, float]],
-) -> None:
+def test_a_motor_stands_still_by_the_plain_rule(sequence: list[tuple[float, float, float]]) -> None:
     """Its speed within the resolution, and for 40 ms no place further than the travel from the
     first of them.
     """
@@ -88,10 +86,7 @@ def test_a_motor_stands_still_by_the_plain_rule(
         assert tested.take(time, angle, velocity) is still
 
 
-@given(
-    start=st.integers(-128, 127),
-    turns=st.lists(st.integers(-127, 127), max_size=50),
-)
+@given(start=st.integers(-128, 127), turns=st.lists(st.integers(-127, 127), max_size=50))
 def test_the_counter_follows_any_steps_of_less_than_half_its_range(
     start: int, turns: list[int]
 ) -> None:

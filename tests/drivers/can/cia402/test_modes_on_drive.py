@@ -32,13 +32,9 @@ def device_in(mode: str) -> DeviceSpec:
     path = ("0x60C1:1",) if mode == "IP" else ("0x607A", "0x6071")
     spec = device()
     assert spec.servo is not None
-    rpdo = (
-        PdoSpec(1, ("0x6040", "0x60FF")),
-        PdoSpec(2, path),
-    )
+    rpdo = (PdoSpec(1, ("0x6040", "0x60FF")), PdoSpec(2, path))
     return dataclasses.replace(
-        spec,
-        servo=dataclasses.replace(spec.servo, motion_mode=mode, rpdo=rpdo),
+        spec, servo=dataclasses.replace(spec.servo, motion_mode=mode, rpdo=rpdo)
     )
 
 

@@ -168,10 +168,7 @@ def test_the_refusal_names_the_drive() -> None:
         read_scale(Objects(ratio(0x608F, 1, 1)), SERVO)  # type: ignore[arg-type]
 
 
-@given(
-    unit=st.floats(1e-9, 0.3),
-    count=st.integers(-(2**31) + 1, 2**31 - 1),
-)
+@given(unit=st.floats(1e-9, 0.3), count=st.integers(-(2**31) + 1, 2**31 - 1))
 def test_counts_are_the_nearest_and_never_wrap(unit: float, count: int) -> None:
     scale = CountScale(unit, unit, unit)
     assert scale.angle_counts(count * unit) == pytest.approx(count, abs=1e-6 * abs(count) + 1)

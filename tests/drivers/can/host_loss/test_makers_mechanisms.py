@@ -94,10 +94,7 @@ def test_what_a_drive_has_is_proved_and_stops_it(file: str, mechanism: str, cert
     ],
 )
 def test_what_a_drive_lacks_is_named(file: str, mechanism: str, lacks: str) -> None:
-    with (
-        rig(drive(file)) as bench,
-        pytest.raises(NotPermitted, match=f"it has no {lacks}"),
-    ):
+    with rig(drive(file)) as bench, pytest.raises(NotPermitted, match=f"it has no {lacks}"):
         bench.axis(device(file, mechanism)).commission()
 
 

@@ -13,11 +13,7 @@ import pytest
 from winchkit import catalog
 from winchkit.can_trace import TraceFrame
 from winchkit.drivers.can.tools.decode import DecodedFrame
-from winchkit.drivers.can.tools.trace_decoder import (
-    Description,
-    TraceDecoder,
-    read_description,
-)
+from winchkit.drivers.can.tools.trace_decoder import Description, TraceDecoder, read_description
 from winchkit.errors import FileError
 
 EDS = catalog.find("devices", "generic-cia402").parent / "generic-cia402.eds"
