@@ -3,7 +3,8 @@
 A prediction is of the torque of a given motion; a simulator needs values with which the measured
 torque makes the measured motion. Each run is cut into pieces whose initial angle and speed are
 unknowns, and a piece has to end where the next one begins: a start that is off diverges within one
-piece only. Runs of effects with memory, whose states nobody measured, are one piece.
+piece only. The first state of a run is measured, with its noise. Runs of effects with memory, whose
+states nobody measured, are one piece.
 
 References
 ----------
@@ -48,6 +49,10 @@ _MOST = 20
 """Steps of the fit; computing cost: each simulates every run once for each value."""
 _TOLERANCE = 1e-6
 """Relative error of a step of the integration, far below that of the model."""
+_THIRD_DIFFERENCE = 0.6745 * 20**0.5
+"""Median absolute third difference of white noise of unit variance."""
+_EXACT = 1e-12
+"""SI: noise of a state that is given without any, so that it has a weight."""
 _SETTLED = 0.1
 """Change of the sum of squares in units of its mean that ends the fit: a value that is off by its
 standard deviation changes it by one."""
@@ -140,19 +145,27 @@ class _Piece:
     setup: Setup
     measured: Array
     """Motor angle at its times, (n,)."""
-    is_first: bool
-    """Whether it begins a run, with the state that is measured there."""
+    noise: tuple[float, float] | None
+    """Of the first piece of a run the noise of its measured angle and speed."""
+
+    @property
+    def is_first(self) -> bool:
+        """Whether it begins a run."""
+        return self.noise is not None
 
 
 def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
     for run in runs:
         (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
-        rate, _ = smoothed_rate(own, profile)
+        rate, rate_noise = smoothed_rate(own, profile)
         whole = setup_of(profile, run, None, float(rate[0]), is_torque=True)
         law = balance(profile, terms, whole.load_mass, is_load_known="load" in whole.inputs.signals)
         count = 1 if law.states else _PIECES
         ends = np.linspace(0, len(whole.time) - 1, count + 1).round().astype(int)
         angle = own["motor_angle"]
+        # Third differences of a motion are far below the noise of an angle.
+        angle_noise = float(np.median(np.abs(np.diff(angle, 3)))) / _THIRD_DIFFERENCE
+        noise = (max(angle_noise, _EXACT), max(float(rate_noise), _EXACT))
         for begin, end in pairwise(ends.tolist()):
             there = slice(begin, end + 1)
             signals = {name: values[there] for name, values in whole.inputs.signals.items()}
@@ -164,7 +177,7 @@ def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) 
                 speed=float(rate[begin]),
                 inputs=Inputs(time, signals),
             )
-            yield _Piece(setup, angle[there], begin == 0)
+            yield _Piece(setup, angle[there], noise if begin == 0 else None)
 
 
 @dataclass(frozen=True)
@@ -220,8 +233,11 @@ class _Shooting:
     def residual(self, ends: Sequence[tuple[Array, float]], states: Array) -> Array:
         """Errors of the angle at all samples, and weighted gaps between the pieces."""
         errors, gaps = [], []
+        off = states - self.states_of_data
         for k, (piece, (angle, speed)) in enumerate(zip(self.pieces, ends, strict=True)):
             errors.append(angle - piece.measured)
+            if piece.noise is not None:
+                gaps.append(self.error * off[k] / piece.noise)
             if k + 1 < len(self.pieces) and not self.pieces[k + 1].is_first:
                 weight = _JOINED * len(angle) ** 0.5
                 lasts = float(piece.setup.time[-1] - piece.setup.time[0])
@@ -268,6 +284,13 @@ class _Shooting:
             self.rms(self.terms, self.states_of_data), self.rms(terms, self.states_at(found.x)),
             found.status > 0,
         )  # fmt: skip
+
+    @cached_property
+    def error(self) -> float:
+        """Error of the pieces at the first values, from the measured states, rms."""
+        ends = self.ends(self.terms, self.states_of_data)
+        off = [angle - p.measured for p, (angle, _) in zip(self.pieces, ends, strict=True)]
+        return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
 
     @cached_property
     def states_of_data(self) -> Array:
