@@ -238,7 +238,7 @@ class _Shooting:
             errors.append(angle - piece.measured)
             if piece.noise is not None:
                 gaps.append(self.error * off[k] / piece.noise)
-            if k + 1 < len(self.pieces) and not self.pieces[k + 1].is_first:
+            if self._joins(k):
                 weight = _JOINED * len(angle) ** 0.5
                 lasts = float(piece.setup.time[-1] - piece.setup.time[0])
                 gap = np.array([angle[-1], speed]) - states[k + 1]
@@ -341,7 +341,7 @@ class _Shooting:
         return out
 
     def _covariance(self, jacobian: Array, residual: Array) -> Array:
-        """Cluster-robust covariance of all unknowns, a cluster being a tenth of a run."""
+        """Cluster-robust covariance: clusters are tenths of runs, first states have their noise."""
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         unit = jacobian / scale
         inverse = np.linalg.pinv(unit.T @ unit, hermitian=True)
@@ -354,5 +354,15 @@ class _Shooting:
                 meat += np.outer(gradient, gradient)
                 clusters += 1
             begin = end
-        factor = clusters / max(clusters - 1, 1)
-        return np.asarray(factor * inverse @ meat @ inverse / np.outer(scale, scale))
+        meat *= clusters / max(clusters - 1, 1)
+        for k, piece in enumerate(self.pieces):
+            if piece.noise is not None:
+                measured = unit[begin : begin + 2]
+                meat += self.error**2 * measured.T @ measured
+                begin += 2
+            begin += 2 * self._joins(k)
+        return np.asarray(inverse @ meat @ inverse / np.outer(scale, scale))
+
+    def _joins(self, k: int) -> bool:
+        """Whether a piece has to end where the next one begins."""
+        return k + 1 < len(self.pieces) and not self.pieces[k + 1].is_first
