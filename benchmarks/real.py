@@ -41,6 +41,7 @@ OURS = "winchkit"
 OUTPUT = "motor_torque"
 MOST_SAMPLES = 10_000
 FOLDS = 5
+FEATURES = ("sine", "cosine", "speed", "direction", "acceleration")
 AXIS = """schema = 1
 kind = "axis"
 name = "{name}"
@@ -68,23 +69,36 @@ class Recording:
     """Empty: the last third of each run."""
     effects: str = ""
     """Effects that the profile has before."""
+    expert: tuple[str | int, ...] = ()
+    """What least squares by hand take: columns of FEATURES, and whole orders of the motor angle.
+
+    As judged on the raw samples before winchkit saw them.
+    """
 
 
 RECORDINGS = (
-    Recording("emps", ("emps/train.csv",), ("emps/test.csv",), MOVING_MASS),
+    Recording(
+        "emps",
+        ("emps/train.csv",),
+        ("emps/test.csv",),
+        MOVING_MASS,
+        expert=("direction", "speed", "acceleration"),  # published: mass, viscous, Coulomb, offset
+    ),
     Recording(
         "odrive-maps",
         tuple(
             f"real/odrive-cogging/map-{m}_16.csv" for m in "ab"
         ),  # map-c has another zero of its angle
         ("real/odrive-cogging/map-d_16.csv",),
+        expert=(7, 28, 14, 36, 12, 84),
     ),
     Recording(
         "franka-q2",
         tuple(f"real/franka-q2/case3_{speed}.csv" for speed in ("slow", "high")),
         ("real/franka-q2/case3_middle.csv",),
+        expert=("direction", "speed", 1),
     ),
-    Recording("openarm-j4", ("real/openarm-j4/collect.csv",)),
+    Recording("openarm-j4", ("real/openarm-j4/collect.csv",), expert=("speed", 1)),
 )
 
 
@@ -136,7 +150,9 @@ class Table:
     columns: Array
     """Shape (n, p), N m per usual-size step; without the mean of each run."""
     features: Array
-    """Shape (n, 5): sine and cosine of the angle, speed, direction, acceleration."""
+    """Shape (n, 5): FEATURES; sine and cosine are those of the motor angle."""
+    run: NDArray[np.intp]
+    """Run of every sample."""
     measured_rms: float
     """Rms of the measured torque about the mean of each run, N m."""
     fold: NDArray[np.intp]
@@ -172,12 +188,13 @@ def table_of(
         values[:, :-6] -= values[:, :-6].mean(axis=0)
         values[:, -1] -= values[:, -1].mean()
         fold = np.arange(len(values)) * FOLDS // len(values)
-        parts.append((values, fold))
+        parts.append((values, fold, np.full(len(values), segment.run)))
     values = np.concatenate([part[0] for part in parts])
     return Table(
         residual=values[:, 0],
         columns=values[:, 1:-6],
         features=values[:, -6:-1],
+        run=np.concatenate([part[2] for part in parts]).astype(np.intp),
         measured_rms=float(np.sqrt(np.mean(values[:, -1] ** 2))),
         fold=np.concatenate([part[1] for part in parts]),
     )
@@ -222,6 +239,9 @@ def results(recording: Recording, folder: Path) -> list[Result]:
     start = _cpu()
     left = test.residual - _boosted(train, test)
     out.append(result("gradient boosting", left, seconds=_cpu() - start))
+    own, held = (_by_hand(recording, table) for table in (train, test))
+    left = test.residual - held @ np.linalg.lstsq(own, train.residual, rcond=None)[0]
+    out.append(result("expert, least squares", left, [str(one) for one in recording.expert]))
     return out
 
 
@@ -257,6 +277,21 @@ def _selected(
     chosen = select(data)
     solved = np.linalg.lstsq(data.columns[:, chosen], train.residual, rcond=1e-8)[0]
     return chosen, solved / length[chosen]
+
+
+def _by_hand(recording: Recording, table: Table) -> Array:
+    """Columns of an expert's least squares, without the mean of each run, (n, p)."""
+    angle = np.arctan2(table.features[:, 0], table.features[:, 1])
+    columns: list[Array] = []
+    for one in recording.expert:
+        if isinstance(one, int):
+            columns += [np.sin(one * angle), np.cos(one * angle)]
+        else:
+            columns.append(table.features[:, FEATURES.index(one)])
+    found = np.column_stack(columns)
+    for run in np.unique(table.run):
+        found[table.run == run] -= found[table.run == run].mean(axis=0)
+    return found
 
 
 def _boosted(train: Table, test: Table) -> Array:

@@ -30,7 +30,15 @@ from winchkit.quantity_text import (
         (249_900.0, "N", "250 kN"),
         (1_642_542.0, "N", "1.64 MN"),
         (0.0030, "N m", "3.00 mN m"),
+        (2.8e-5, "N m", "28.0 µN m"),
         (203.5, "N m s", "204 N m s"),
+        (4.5476e-5, "N m s", "45.5 µN m s"),
+        (1e-6, "rad/s", "1.00 µrad/s"),
+        (0.05, "rad/s", "50.0 mrad/s"),
+        (3e-6, "N m/s", "3.00 µN m/s"),
+        (-0.052, "N m/rad", "−52.0 mN m/rad"),
+        (0.004, "N s/m", "4.00 mN s/m"),
+        (2e-5, "m/s", "20.0 µm/s"),
         (200_000.0, "N/m", "200 N/mm"),
         (1e-4, "kg m^2", "1.00 kg cm²"),
         (0.14, "kg/m", "0.140 kg/m"),
@@ -132,3 +140,10 @@ def test_an_interval_without_one_of_its_ends() -> None:
     assert between(751.7e3, math.inf, "N") == "above 752 kN"
     assert between(-math.inf, 0.02, "m") == "below 20.0 mm"
     assert between(-math.inf, math.inf, "N") == "any value"
+
+
+def test_an_interval_has_the_unit_of_its_value() -> None:
+    of_value = scale_for((0.0999, 0.0006), "N m")
+    assert between(0.0987, 0.1011, "N m") == "0.0987 to 0.1011 N m"
+    assert between(0.0987, 0.1011, "N m", of_value) == "98.7 to 101.1 mN m"
+    assert between(0.0987, math.inf, "N m", of_value) == "above 98.7 mN m"

@@ -11,25 +11,38 @@ from math import floor, isfinite, isnan, log10
 from re import compile as pattern
 
 _DEG = 57.29577951308232
-_LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
-    "m": ((1e-4, "µm", 1e-6), (1.0, "mm", 1e-3), (float("inf"), "m", 1.0)),
-    "m/s": ((0.1, "mm/s", 1e-3), (float("inf"), "m/s", 1.0)),
-    "N": ((0.01, "mN", 1e-3), (1e3, "N", 1.0), (1e6, "kN", 1e3), (float("inf"), "MN", 1e6)),
-    "N m": ((0.1, "mN m", 1e-3), (1e3, "N m", 1.0), (float("inf"), "kN m", 1e3)),
-    "N/m": ((1e3, "N/m", 1.0), (1e6, "N/mm", 1e3), (float("inf"), "kN/mm", 1e6)),
-    "N/s": ((1e-3, "N/h", 1 / 3600), (0.1, "N/min", 1 / 60), (float("inf"), "N/s", 1.0)),
-    "N/K": ((0.1, "mN/K", 1e-3), (float("inf"), "N/K", 1.0)),
-    "N s/m": ((1e3, "N s/m", 1.0), (float("inf"), "kN s/m", 1e3)),
-    "N m s": ((0.1, "mN m s", 1e-3), (float("inf"), "N m s", 1.0)),
-    "kg": ((0.1, "g", 1e-3), (float("inf"), "kg", 1.0)),
-    "kg/m": ((0.1, "g/m", 1e-3), (float("inf"), "kg/m", 1.0)),
-    "kg m^2": ((1e-7, "g cm²", 1e-7), (0.1, "kg cm²", 1e-4), (float("inf"), "kg m²", 1.0)),
-    "s": ((1e-3, "µs", 1e-6), (1.0, "ms", 1e-3), (float("inf"), "s", 1.0)),
-    "rad": ((1e-5, "µrad", 1e-6), (1e-3, "mrad", 1e-3), (float("inf"), "°", 1 / _DEG)),
-    "1/K": ((1e-2, "·10⁻⁶/K", 1e-6), (float("inf"), "/K", 1.0)),
-    "degC": ((float("inf"), "°C", 1.0),),
-    "%": ((float("inf"), "%", 1e-2),),
-    "1": ((float("inf"), "", 1.0),),
+_ANY = float("inf")
+_Ladder = tuple[tuple[float, str, float], ...]
+
+
+def _prefixed(unit: str) -> _Ladder:
+    """Prefixes of a unit, so that a value has at most three digits before its point.
+
+    A speed of 1570 rad/s keeps its unit; kN m and kN s/m are usual.
+    """
+    small = (1e-4, f"µ{unit}", 1e-6), (0.1, f"m{unit}", 1e-3)
+    if unit.startswith("N"):
+        return *small, (1e3, unit, 1.0), (_ANY, f"k{unit}", 1e3)
+    return *small, (_ANY, unit, 1.0)
+
+
+_LADDERS: dict[str, _Ladder] = {
+    "m": ((1e-4, "µm", 1e-6), (1.0, "mm", 1e-3), (_ANY, "m", 1.0)),
+    "N": ((0.01, "mN", 1e-3), (1e3, "N", 1.0), (1e6, "kN", 1e3), (_ANY, "MN", 1e6)),
+    "N/m": ((1e3, "N/m", 1.0), (1e6, "N/mm", 1e3), (_ANY, "kN/mm", 1e6)),
+    "N/s": ((1e-3, "N/h", 1 / 3600), (0.1, "N/min", 1 / 60), (_ANY, "N/s", 1.0)),
+    "kg": ((0.1, "g", 1e-3), (_ANY, "kg", 1.0)),
+    "kg/m": ((0.1, "g/m", 1e-3), (_ANY, "kg/m", 1.0)),
+    "kg m^2": ((1e-7, "g cm²", 1e-7), (0.1, "kg cm²", 1e-4), (_ANY, "kg m²", 1.0)),
+    "s": ((1e-3, "µs", 1e-6), (1.0, "ms", 1e-3), (_ANY, "s", 1.0)),
+    "rad": ((1e-5, "µrad", 1e-6), (1e-3, "mrad", 1e-3), (_ANY, "°", 1 / _DEG)),
+    "1/K": ((1e-2, "·10⁻⁶/K", 1e-6), (_ANY, "/K", 1.0)),
+    "degC": ((_ANY, "°C", 1.0),),
+    "%": ((_ANY, "%", 1e-2),),
+    "1": ((_ANY, "", 1.0),),
+} | {
+    unit: _prefixed(unit)
+    for unit in ("N m", "N m s", "N m/s", "N m/rad", "N s/m", "N/K", "m/s", "rad/s")
 }
 """Per SI unit: upper limit of the magnitude, label, and SI value of the label's unit."""
 _WITHIN_A_FIGURE = pattern(r"(?<=[\d±=]) | (?=[±=])|(?<=N) (?=m\b)|(?<=m) (?=s\b)")
@@ -65,7 +78,7 @@ def scale_for(sizes: float | Sequence[float], unit: str) -> PrintScale:
     """The scale for the largest of some SI values; an unknown unit is kept."""
     values = [sizes] if isinstance(sizes, int | float) else sizes
     size = max((abs(v) for v in values if isfinite(v)), default=0.0)
-    ladder = _LADDERS.get(unit, ((float("inf"), unit, 1.0),))
+    ladder = _LADDERS.get(unit, ((_ANY, unit, 1.0),))
     if size == 0.0:
         label, worth = next(((n, w) for _, n, w in ladder if w == 1.0), ladder[-1][1:])
         return PrintScale(label, worth)
@@ -89,7 +102,7 @@ def with_std(value: float, std: float, unit: str, scale: PrintScale | None = Non
     """
     if not isfinite(value) or not isfinite(std) or std <= 0:
         return (scale or scale_for(value, unit)).text(value)
-    scale = scale or scale_for(max(abs(value), std), unit)
+    scale = scale or scale_for((value, std), unit)
     shown, deviation = value / scale.worth, std / scale.worth
     decimals = 1 - floor(log10(deviation))
     if round(deviation, decimals) >= 10 ** (2 - decimals):
@@ -125,13 +138,17 @@ def significant(value: float, digits: int = 3) -> str:
     return _fixed(value, digits - 1 - exponent)
 
 
-def between(low: float, high: float, unit: str) -> str:
-    """An SI interval with two digits of its width: ``236 to 259 kN``; one end: ``above 236 kN``."""
+def between(low: float, high: float, unit: str, scale: PrintScale | None = None) -> str:
+    """An SI interval with two digits of its width: ``236 to 259 kN``; one end: ``above 236 kN``.
+
+    The scale is that of the larger end unless another one is given.
+    """
+    known = [end for end in (low, high) if isfinite(end)]
+    if not known:
+        return "any value"
+    scale = scale or scale_for(known, unit)
     if not isfinite(high) or not isfinite(low):
-        if not isfinite(high) and not isfinite(low):
-            return "any value"
-        return f"below {quantity(high, unit)}" if isfinite(high) else f"above {quantity(low, unit)}"
-    scale = scale_for((low, high), unit)
+        return f"{'below' if isfinite(high) else 'above'} {scale.text(known[0])}"
     ends, apart = (low / scale.worth, high / scale.worth), abs(high - low) / scale.worth
     decimals = 1 - floor(log10(apart)) if apart > 0 else 2
     return f"{_fixed(ends[0], decimals)} to {scale.labelled(_fixed(ends[1], decimals))}"

@@ -265,6 +265,7 @@ def diagnose_prepared(
 
 def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:
     """Errors of the profile and scores of the candidates, without a verdict."""
+    start = _by_file(engine, start)
     before, dataset = (start.initial_model, start.initial_noise), engine.regression.dataset
     diagnosis = Diagnosis(
         verdict="unknown",
@@ -286,9 +287,15 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
     return WinchAnswer(engine, start, in_units_of(dataset.profile, diagnosis))
 
 
+def _by_file(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
+    """A result with the errors of the file's values: refitted ones would imitate a wrong factor."""
+    own = file_model(engine, engine.initial_model, result.initial_noise)
+    return replace(result, initial_model=own)
+
+
 def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
     """Verdict ``unknown`` for runs with a wrong sign or unit: no effect must explain that."""
-    result = initial_result(engine)
+    result = _by_file(engine, initial_result(engine))
     dataset, model = engine.regression.dataset, (result.initial_model, result.initial_noise)
     diagnosis = Diagnosis(
         verdict="unknown",

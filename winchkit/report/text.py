@@ -240,6 +240,8 @@ def error_lines(
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
     held_out = f"held out: measured on {data} that the fit had not seen"
+    if extended:  # Then values with their deviations stand above.
+        held_out = f"± one standard deviation; held out: on {data} that the fit had not seen"
     if not offsets:
         return [*aligned(rows), f"  ({held_out})"]
     own = " and ".join(dict.fromkeys(OUTPUT_NAMES.get(o.output, o.output) for o in offsets))

@@ -205,7 +205,9 @@ def card(
             {
                 "name": parameter_name(name),
                 "text": with_std(e.value, e.std, e.unit),
-                "interval": None if e.interval is None else between(*e.interval, e.unit),
+                "interval": None
+                if e.interval is None
+                else between(*e.interval, e.unit, scale_for((e.value, e.std), e.unit)),
             }
             for name, e in values.items()
         ],

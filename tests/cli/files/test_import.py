@@ -368,6 +368,41 @@ def test_on_a_terminal_the_axes_of_a_long_table_are_separated(tmp_path: Path) ->
     assert (tmp_path / "again" / "log.csv").read_bytes().count(b"\n") > len(m.time)
 
 
+def test_columns_of_which_nothing_is_decided_are_shown_with_their_values(tmp_path: Path) -> None:
+    """A table of four axes without a header, of more columns than are listed when not used."""
+    m = motion()
+    rows = [
+        ",".join(f"{v:.10g}" for v in (time, axis, angle + axis, *range(20, 30)))
+        for time, angle in zip(m.time, m.angle, strict=True)
+        for axis in range(4)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(rows) + "\n")
+    shown = command(path).stdout
+    assert "which column '2' names (0, 1, 2, 3)" in shown
+    assert "  13      —                                   29 29 29" in shown
+    assert "not used" not in shown
+
+
+def test_a_file_of_times_alone_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "time.txt"
+    path.write_text("".join(f"{time:.6f}\n" for time in motion().time))
+    shown = command(path).stdout
+    assert "no column is a channel of a run by its name: the file has times only" in shown
+
+
+@pytest.mark.parametrize("angle", ["q_deg", "(q_deg+q_deg)/2"])
+def test_a_column_is_named_as_in_the_file_with_its_unit(angle: str, tmp_path: Path) -> None:
+    """``q_deg`` is read as the name q and the unit deg; a user types what the file has."""
+    path = log(tmp_path / "log.csv", "t_s,q_deg,spare,M_VOLT,force [N]")
+    given = ("-c", f"motor_angle={angle}", "-c", "motor_torque=M_VOLT*2", "-c", "tension=")
+    result = command(path, "-o", tmp_path / "runs", "-y", *given)
+    assert result.exit_code == 0, result.output
+    run, m = read_run(tmp_path / "runs" / "log.csv"), motion()
+    assert run["motor_angle"] == pytest.approx(m.angle)
+    assert run["motor_torque"] == pytest.approx(200 * m.torque / RATED)
+
+
 def _on_terminal(arguments: Sequence[str], talk: Sequence[tuple[str, str]]) -> str:
     """Output of a command on a pseudo-terminal, with the answer to each prompt."""
     import pty

@@ -10,9 +10,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from calibration_cases import rows
-from report_answers import recorded
+from report_answers import answer_of, diagnosis_of, recorded
 from robot_poses.truth import csv
 from winchkit.cli import main
+from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.results import Estimate, Step
 from winchkit.runs import write_run
 
 
@@ -50,6 +52,19 @@ def test_verbose_adds_how_it_was_reached(elastic: list[Path]) -> None:
     for part in ("detectable with these runs (90 % power)", "highest evidence", "correlation"):
         assert part in long
         assert part not in short
+
+
+def test_a_robot_whose_geometry_differs_as_a_whole_is_calibrated_next(
+    elastic: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = {"exit-point": {"x": Estimate(0.1, 0.01, "m")}}
+    whole = Step(("exit-point", "anchor-point"), moved, 0.9, whole=True)
+    real = answer_of("demo-adequate")
+    found = WinchAnswer(real.engine, real.result, diagnosis_of("explained", whole))
+    monkeypatch.setattr("winchkit.diagnosis.diagnose.diagnose", lambda *_, **__: found)
+    result = call("diagnose", *elastic, "-p", "bench-spiral")
+    assert "Calibrate the robot first" in result.stdout
+    assert "next: winchkit calibrate bench-spiral" in result.stderr
 
 
 @pytest.fixture(scope="module")

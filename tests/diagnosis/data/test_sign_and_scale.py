@@ -234,6 +234,25 @@ def test_gravity_in_the_profile_determines_the_unit_without_a_load(factor: float
     assert codes([scaled(run, "motor_torque", factor)], known) == [("motor_torque", "wrong-factor")]
 
 
+def test_the_error_beside_a_wrong_factor_is_that_of_the_values_in_the_file() -> None:
+    """Refitted, the profile's gravity would follow the wrong sign down to the noise."""
+    known = replace(
+        GROOVED,
+        effect=(
+            EffectTable("motor-cogging", GRAVITY),
+            EffectTable("rotor-inertia", {"inertia": "0.4 kg m^2"}),
+        ),
+    )
+    right = joint(2, 1.0)[0]
+    wrong = scaled(right, "motor_torque", -0.3)
+    found = diagnose([wrong], known).diagnosis
+    assert "inverted-sign" in found.caveats
+    difference = float(np.std(right["motor_torque"] - wrong["motor_torque"]))
+    error = found.outputs["motor_torque"]
+    assert error.heldout_rms_before > 0.8 * difference
+    assert error.heldout_rms_before > 10 * (error.noise_rms or 0.0)
+
+
 def test_an_effect_of_the_user_in_the_profile_is_a_prediction() -> None:
     catalogue = load_catalogue()
     own = replace(catalogue["rotor-inertia"], id="mine")

@@ -34,17 +34,16 @@ def test_radius_and_ratio_have_one_cable_per_motor_turn() -> None:
         assert found.std == pytest.approx(turn * 5e-5, rel=0.02)
 
 
-def test_other_sets_have_shares_that_add_up_to_one() -> None:
+def test_parameters_of_unlike_units_have_no_combination() -> None:
     terms = (term("cell-gain", gain_error=0.02), term("cell-offset", offset=4.0))
     values = {
         "cell-gain": {"gain_error": Estimate(0.02, 0.001, "1")},
         "cell-offset": {"offset": Estimate(4.0, 0.3, "N")},
     }
-    found = combination_of_set(terms, values, None)
-    assert found is not None
-    assert found.name == "gain_error/(0.02) + offset/(4 N)"
-    assert (found.value, found.std) == (1.0, pytest.approx(0.05))
-    assert combination_of_set(terms[:1], values, None) is None
+    assert combination_of_set(terms, values, DATASET) is None
+    radius = term("drum-radius", radius_error=3e-4)
+    alone = {"drum-radius": {"radius_error": Estimate(3e-4, 3e-6, "m")}}
+    assert combination_of_set((radius,), alone, DATASET) is None
 
 
 def test_correlated_parameters_have_the_direction_of_least_variance() -> None:

@@ -148,6 +148,15 @@ def test_what_would_change_the_verdict(verdict: str, text: str) -> None:
     assert changes_text(diagnosis_of(verdict, *steps)).startswith(text)
 
 
+@pytest.mark.parametrize("verdict", ["explained", "partly", "unknown"])
+def test_a_geometry_that_differs_as_a_whole_is_calibrated_first(verdict: str) -> None:
+    moved = {"exit-point": {"x": Estimate(0.1, 0.01, "m")}}
+    whole = Step(("exit-point", "anchor-point"), moved, 0.9, whole=True)
+    run = NextRun(("exit-point", "anchor-point"), "poses farther out", 0.9)
+    told = changes_text(diagnosis_of(verdict, whole, next_runs=(run,)))
+    assert told.startswith("Calibrate the robot first")
+
+
 def test_a_run_that_decides_comes_with_its_power() -> None:
     run = NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, twice the load", 0.93)
     assert changes_text(diagnosis_of("explained", FRICTION, next_runs=(run,))) == (

@@ -51,6 +51,18 @@ def test_a_set_has_the_values_of_every_kind() -> None:
     )
 
 
+def test_the_orders_of_a_series_have_one_unit() -> None:
+    values = {
+        "amplitude": Estimate(1.2413e-3, 6.8e-6, "N m"),
+        "order": Estimate(12.0, 0.0, "1"),
+        "amplitude_2": Estimate(0.0454e-3, 9.4e-6, "N m"),
+        "order_2": Estimate(36.0, 0.0, "1"),
+    }
+    cogging = replace(ELASTIC, effects=("motor-cogging",), parameters={"motor-cogging": values})
+    text = step_text(cogging)
+    assert "1.2413 ± 0.0068 mN m at order 12, 0.0454 ± 0.0094 mN m at order 36" in text
+
+
 def test_laws_of_one_kind_are_named_once() -> None:
     laws = ("cable-elongation-linear", "cable-elongation-exponential", "cable-elongation-quartic")
     doubt = Doubt("alternatives", "")

@@ -22,6 +22,7 @@ from winchkit.calibration.cell.health import (
 )
 from winchkit.drivers.reading import Quality
 from winchkit.errors import Fault, RunError
+from winchkit.quantity_text import with_std
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
@@ -254,8 +255,8 @@ def examine_recording(recording: CellRecording) -> CellFindings:
     slope, std = _temperature(recording, samples.usable & ~spikes)
     if abs(slope) > _SIGNIFICANT * std:
         remarks.append(
-            f"the reading follows the temperature: {slope:+.3g} ± {std:.2g} {recording.unit} per "
-            "degree of its column; a drift in time is part of it"
+            f"the reading follows the temperature: {with_std(slope, std, '1')} {recording.unit} "
+            "per degree of its column; a drift in time is part of it"
         )
     return CellFindings(
         recording.name,

@@ -17,6 +17,7 @@ from winchkit.cli.core.completion import complete_winch
 from winchkit.cli.core.options import TABLE, bench_by_default, bench_file_option, duration_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import UsageError, one_line
+from winchkit.quantity_text import with_std
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
@@ -133,7 +134,7 @@ def _lines_of_recorded(one: CellFindings, run: str) -> Iterator[str]:
     yield one_line(f"{one.name}{unit}, {run}:")
     yield from (f"  {line}" for line in _lines(one.health, one.unit))
     if math.isfinite(one.temperature_slope):
-        slope = f"{one.temperature_slope:+.3g} ± {one.temperature_slope_std:.2g}"
+        slope = with_std(one.temperature_slope, one.temperature_slope_std, "1")
         yield f"  over the temperature: {slope} {one.unit} per degree of its column"
     yield from (f"  ! {remark}" for remark in one.remarks)
 
@@ -169,13 +170,13 @@ def _lines(health: Health, unit: str) -> list[str]:
         f"mean {shown(health.mean, unit)}",
         f"noise: {shown(health.noise, unit, 3)} rms"
         + (f" ({health.noise_counts:.2g} counts)" if math.isfinite(health.noise_counts) else ""),
-        f"drift: {health.drift * 60:+.3g} ± {health.drift_std * 60:.2g} {unit} a minute",
+        f"drift: {with_std(health.drift * 60, health.drift_std * 60, '1')} {unit} a minute",
     ]
     for hum in health.hum:
         found = (
             "cannot be measured at this rate"
             if math.isnan(hum.amplitude)
-            else f"{hum.amplitude:.3g} ± {hum.std:.2g} {unit}"
+            else f"{with_std(hum.amplitude, hum.std, '1')} {unit}"
             + ("" if hum.there else " (within the noise)")
         )
         lines.append(f"hum at {hum.frequency:g} Hz: {found}")

@@ -80,11 +80,13 @@ def tables_text(group: Sequence[Guess]) -> str:
     title = f"{names}: {table.layout}; {len(table.columns)} columns, {rows} rows"
     columns = {column.source: column for column in table.columns}
     ordered = sorted(guess.assignments, key=lambda item: not item.channel)
-    unused = [item for item in ordered if not item.channel]
-    listed = [item for item in ordered if item.channel or len(unused) <= _UNUSED]
+    # Without a reason nothing is decided yet: the values of a column help to answer the question.
+    unused = [item for item in ordered if not item.channel and item.reason]
+    few = len(unused) <= _UNUSED
+    listed = [item for item in ordered if few or item.channel or not item.reason]
     lines = [_HEAD, *(_row(item, columns[item.source]) for item in listed)]
     body = aligned(lines, words=len(_HEAD))
-    body += _not_used(unused) if len(unused) > _UNUSED else []
+    body += [] if few else _not_used(unused)
     constants = ", ".join(f"{one_line(k)} = {v:g}" for k, v in table.constants.items())
     notes = [f"  constants: {constants}"] if constants else []
     told = [(one.table.path, note) for one in group for note in (*one.table.notes, *one.notes)]

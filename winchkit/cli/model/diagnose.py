@@ -131,7 +131,7 @@ def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:
 
 
 def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
-    """Next command: add or refit the first effect of one law, else plan runs or write an effect."""
+    """Next command: calibrate a robot, add the first effect, plan runs or write an effect."""
     if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
     if column := _mending(diagnosis):
@@ -142,11 +142,15 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
 
     if unrelated_outputs(diagnosis):
         return
-    first = next(iter(reported(diagnosis).steps), None)
-    words = ("-p", asked.profile, *asked.options)
-    if first is not None and len(first.effects) == 1:
-        from winchkit.profile_edit.naming import extended_name
+    from winchkit.profile_edit.naming import extended_name
 
+    told = reported(diagnosis).steps
+    first = next(iter(told), None)
+    words = ("-p", asked.profile, *asked.options)
+    if any(step.whole for step in told):
+        file = extended_name(asked.profile, "calibrated")
+        suggest_next("calibrate", asked.profile, runs, "-o", file)
+    elif first is not None and len(first.effects) == 1:
         file = extended_name(asked.profile, first.effects[0])
         suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
     elif first is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":

@@ -1,7 +1,7 @@
 """The combination of parameters that the data determine, where single ones are uncertain.
 
-Members of an equivalence set explain the same change; each parameter alone depends on which member
-is true, and the change does not. Strongly correlated parameters of one effect are given as the
+A wrong radius and a wrong ratio explain the same change of the cable per motor turn, which does not
+depend on which of the two is true. Strongly correlated parameters of one effect are given as the
 eigenvector of the smallest eigenvalue of their correlation matrix.
 
 References
@@ -12,14 +12,13 @@ Belsley, D. A., Kuh, E., Welsch, R. E. (1980). Regression Diagnostics. Wiley, ch
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isfinite, pi
+from math import pi
 
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import ValueCovariance
 from winchkit.diagnosis.results import Combination, Estimate
-from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
@@ -40,33 +39,16 @@ def combination_of_set(
     """Combination of parameters that the data determine, whichever member of a set is true.
 
     ``dataset``: None for a robot. Returns: the cable per motor turn, mean over the runs, for a
-    wrong radius or ratio; the indicated one where the length instrument may be wrong as well.
-    Otherwise the sum of all amplitudes, each over its fitted value, which is one. None for a single
-    effect, and where a member has more than one amplitude.
+    wrong radius or ratio; the indicated one where the length instrument may be wrong as well. None
+    for other sets: their parameters have no sum.
     """
-    ids = {term.effect.id for term in terms}
-    if len(ids) < 2:
+    if dataset is None or not {term.effect.id for term in terms} >= _WINDING:
         return None
-    sole = [_sole_amplitude(term.effect) for term in terms]
-    if ids >= _WINDING and dataset is not None:
-        known = next(i for i, term in enumerate(terms) if term.effect.id in _WINDING)
-        (estimate,) = parameters[terms[known].effect.id].values()
-        shown = any(term.effect.stage is Stage.LENGTH_INSTRUMENT for term in terms)
-        name = "indicated cable per motor turn" if shown else "cable per motor turn"
-        return _cable_per_motor_turn(name, terms[known], estimate.std, dataset)
-    if any(parameter is None for parameter in sole):
-        return None
-    pairs = [
-        (parameter, parameters[term.effect.id][parameter.name])
-        for term, parameter in zip(terms, sole, strict=True)
-        if parameter is not None
-    ]
-    if not all(estimate.value - p.null and isfinite(estimate.value) for p, estimate in pairs):
-        return None
-    name = " + ".join(_share(p, estimate) for p, estimate in pairs)
-    parameter, first = pairs[0]
-    size = first.value if parameter.reciprocal else first.value - parameter.null
-    return Combination(name, 1.0, abs(first.std / size), "1")
+    known = next(term for term in terms if term.effect.id in _WINDING)
+    (estimate,) = parameters[known.effect.id].values()
+    shown = any(term.effect.stage is Stage.LENGTH_INSTRUMENT for term in terms)
+    name = "indicated cable per motor turn" if shown else "cable per motor turn"
+    return _cable_per_motor_turn(name, known, estimate.std, dataset)
 
 
 def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination | None:
@@ -125,20 +107,3 @@ def _length_per_turn(term: Term, dataset: Dataset) -> float:
         products += float(turns @ line.predict(recording.smooth)["cable_length"])
         squares += float(turns @ turns)
     return abs(products / squares) if squares else 0.0
-
-
-def _sole_amplitude(effect: Effect) -> Parameter | None:
-    """The amplitude of an effect that has no other fitted parameter."""
-    coordinates = Coordinates(effect)
-    return coordinates.amplitudes[0] if len(coordinates) == 1 else None
-
-
-def _share(parameter: Parameter, estimate: Estimate) -> str:
-    """An amplitude over its fitted value; a stiffness the other way round."""
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    if parameter.reciprocal:
-        return f"({estimate.value:.4g}{unit})/{parameter.name}"
-    if parameter.null:
-        size = estimate.value - parameter.null
-        return f"({parameter.name} − {parameter.null:g})/({size:.4g}{unit})"
-    return f"{parameter.name}/({estimate.value:.4g}{unit})"

@@ -10,7 +10,7 @@ from math import isfinite
 from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
 from winchkit.model.stages import RESULT_UNITS
-from winchkit.quantity_text import quantity
+from winchkit.quantity_text import quantity, scale_for, with_std
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
 _DO = {
@@ -84,9 +84,9 @@ def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
     ]
     return ChangeText(
         clause(parameter.effect),
-        _value(change.size, change.size_std, parameter.unit),
+        _value(change.size, change.size_std, parameter),
         since,
-        _value(winch.value, winch.std, parameter.unit),
+        _value(winch.value, winch.std, parameter),
         ", ".join(costs),
         _limit(winch, parameter.unit),
         _do(parameter.effect),
@@ -99,7 +99,7 @@ def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
     yield f"winch {winch.winch}: {text.cause}: {name} changed by {text.size} {text.since}"
     yield (
         f"  {winch.kind}; q = {winch.change_q_value:.1g}; now {text.now}, all winches "
-        f"{_value(parameter.common, parameter.common_std, parameter.unit)}"
+        f"{_value(parameter.common, parameter.common_std, parameter)}"
     )
     if text.cost:
         yield f"  costs {text.cost} (rms over the runs)"
@@ -110,20 +110,20 @@ def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
 
 def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
     """Two lines of a winch that differs from the others."""
-    own = _value(winch.value, winch.std, parameter.unit)
-    others = _value(parameter.common, parameter.common_std, parameter.unit)
+    own = _value(winch.value, winch.std, parameter)
+    others = _value(parameter.common, parameter.common_std, parameter)
     name = f"{parameter.effect} {parameter.parameter}"
     yield f"winch {winch.winch} differs from the others: {name} {own}, the others {others}"
     yield (
         f"  q = {winch.odd_q_value:.1g}; pooled "
-        f"{_value(winch.pooled, winch.pooled_std, parameter.unit)}; do: "
+        f"{_value(winch.pooled, winch.pooled_std, parameter)}; do: "
         f"{_do(parameter.effect)}; or is it another winch's profile?"
     )
 
 
 def beyond_text(parameter: FleetParameter, winch: WinchHistory) -> str:
     """Sentence on a winch beyond a limit."""
-    own = _value(winch.value, winch.std, parameter.unit)
+    own = _value(winch.value, winch.std, parameter)
     name = f"{parameter.effect} {parameter.parameter}"
     return f"winch {winch.winch}: {name} {own}, {_limit(winch, parameter.unit)}"
 
@@ -156,10 +156,10 @@ def _plain(value: float, unit: str) -> str:
     return f"{100 * value:.4g} %" if unit == "1" else quantity(value, unit)
 
 
-def _value(value: float, std: float, unit: str) -> str:
-    if unit == "1":
-        return f"{100 * value:.4g} ± {100 * std:.2g} %"
-    return f"{value:.4g} ± {std:.2g} {unit}"
+def _value(value: float, std: float, parameter: FleetParameter) -> str:
+    """A value with its deviation; all of a parameter in the unit of their common value."""
+    unit = "%" if parameter.unit == "1" else parameter.unit
+    return with_std(value, std, unit, scale_for((parameter.common, parameter.common_std), unit))
 
 
 def day_text(time: float) -> str:

@@ -164,20 +164,22 @@ def changes_text(diagnosis: Diagnosis) -> str:
             f"Check the instrument of the {names}, its wiring and its column in the file: no "
             "effect of the motion explains what differs between repeats."
         )
+    whole = any(step.whole for step in reported(diagnosis).steps)
+    if whole and diagnosis.verdict != "undecided":
+        return "Calibrate the robot first: beside a wrong geometry an effect may imitate it."
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."
     if diagnosis.next_runs:
         run = diagnosis.next_runs[0]
         power = "" if isnan(run.power) else f" (power {percent(run.power)})"
         return f"To decide{_between(run.separates)}: {run.programme.rstrip('.')}{power}."
-    if diagnosis.verdict == "explained":
-        return (
-            f"To check: record {beyond}. If the new model misses it by more than the noise, this "
-            "result is wrong."
-        )
     rest = "the rest" if reported(diagnosis).steps else "it"
     return (
-        f"To explain {rest}: write an effect of your own, or record a run that isolates its cause."
+        f"To check: record {beyond}. If the new model misses it by more than the noise, this "
+        "result is wrong."
+        if diagnosis.verdict == "explained"
+        else f"To explain {rest}: write an effect of your own, or record a run that isolates its "
+        "cause."
     )
 
 

@@ -8,7 +8,7 @@ from math import isfinite
 
 from winchkit.diagnosis.results import Combination, Estimate, series_orders
 from winchkit.effects.series import fundamentals
-from winchkit.quantity_text import between, with_std
+from winchkit.quantity_text import between, scale_for, with_std
 from winchkit.report.words.effect_names import EFFECTS
 
 VERDICT_NAMES = {
@@ -123,8 +123,10 @@ def values_text(values: Mapping[str, Estimate]) -> str:
     orders = series_orders(values)
     largest = orders[0][1].value
     main = [order for order, amplitude in orders if amplitude.value >= _MAIN_ORDERS * largest]
+    unit = orders[0][1].unit
+    scale = scale_for(largest, unit)
     shown = [
-        f"{with_std(amplitude.value, amplitude.std, amplitude.unit)} at order {order}"
+        f"{with_std(amplitude.value, amplitude.std, unit, scale)} at order {order}"
         for order, amplitude in orders[:_ORDERS_SHOWN]
     ]
     more = len(orders) - len(shown)
@@ -141,7 +143,8 @@ def interval_text(parameter: str, estimate: Estimate) -> str:
     if estimate.interval is None or not all(isfinite(end) for end in estimate.interval):
         return ""
     unit = parameter_unit(parameter, estimate.unit)
-    return f"95 %: {between(*estimate.interval, unit)}"
+    scale = scale_for((estimate.value, estimate.std), unit)
+    return f"95 %: {between(*estimate.interval, unit, scale)}"
 
 
 def listed(words: list[str], last: str = "and") -> str:

@@ -29,6 +29,7 @@ from math import comb
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import with_std
 from winchkit.robot.identification.bundle_adjustment import Solution
 from winchkit.robot.identification.equations import RobotEquations
 
@@ -85,9 +86,9 @@ class Ratios:
         right = [ratio.line for ratio in self.lines if not ratio.named]
         beside = f"compared with {_listed(right)}" if right else "by the size of the robot"
         out = [
-            f"line {ratio.line}: the cable per motor turn differs by {100 * ratio.change:+.2f} ± "
-            f"{100 * ratio.std:.2f} % from the profile, {beside}: gear ratio, counts per turn or "
-            "winding radius of its winch"
+            f"line {ratio.line}: the cable per motor turn differs by "
+            f"{with_std(ratio.change, ratio.std, '%')} from the profile, {beside}: gear ratio, "
+            "counts per turn or winding radius of its winch"
             for ratio in self.lines
             if ratio.named
         ]

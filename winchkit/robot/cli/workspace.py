@@ -12,6 +12,7 @@ from winchkit.cli.core.options import PROFILE, bench_file_option, output_option,
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError
+from winchkit.quantity_text import with_std
 
 if TYPE_CHECKING:
     from winchkit.robot.geometry.robot import Robot
@@ -220,7 +221,7 @@ def _text(robot: Robot, found: Workspace, demand: CableDemand) -> str:
     lines = [f"{robot.profile.name}: {poses} poses, cells of {grid.step * 1e3:.4g} mm, {about}"]
     for name in found.levels:
         volume, uncertainty = found.volume(name)
-        size = f"{volume:.4g} ± {uncertainty:.2g} {_unit(grid)}" if volume else "nowhere"
+        size = f"{with_std(volume, uncertainty, '1')} {_unit(grid)}" if volume else "nowhere"
         lines.append(f"{name:16} {size:24} {_asked(name, demand)}".rstrip())
     if grid.free[2] and len(grid.axes[2]) > 1:
         unit = _unit(grid, sliced=True)

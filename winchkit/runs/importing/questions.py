@@ -144,9 +144,10 @@ def ask_columns(work: Work, choice: Choice) -> None:
         )
     if not bases - {"time", DATE} and not choice.questions:
         names = ", ".join(repr(c.column.source) for c in choice.unused)
+        there = f"; there are {names}" if names else ": the file has times only"
         work.questions.append(
             Question(
-                f"no column is a channel of a run by its name; there are {names}",
+                f"no column is a channel of a run by its name{there}",
                 (
                     '--column "motor_angle=COLUMN [deg]"',
                     '--column "motor_torque=COLUMN [N m]"',

@@ -82,11 +82,20 @@ class ColumnTable:
     """Sampling interval that the file declares, s."""
 
     def column(self, source: str) -> FileColumn | None:
-        """The column of a unique name, or of a number where no column has that name."""
+        """The column of a unique name; else of a number, or of a name with its unit: ``q_deg``."""
         found = next((item for item in self.columns if item.source == source), None)
-        if found is None and source.isdecimal():
-            found = next((item for item in self.columns if str(item.number) == source), None)
-        return found
+        if found is not None:
+            return found
+        if source.isdecimal():
+            return next((item for item in self.columns if str(item.number) == source), None)
+        own = _letters(source)
+        same = [c for c in self.columns if own and c.unit and own == _letters(c.name + c.unit)]
+        return same[0] if len(same) == 1 else None
+
+
+def _letters(text: str) -> str:
+    """Letters and digits of a name, whatever separates them."""
+    return "".join(filter(str.isalnum, text.casefold()))
 
 
 def clock_before(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn | None:

@@ -20,6 +20,7 @@ from itertools import pairwise
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import with_std
 from winchkit.runs.importing.streams import Streams
 
 _MOST = 200_000
@@ -89,7 +90,7 @@ class Agreement:
         first, second = self.pair
         digits = max(0, 1 - math.floor(math.log10(max(self.lag_std * 1e3, 1e-9))))
         drift = (
-            f", clocks drift by {self.drift * 1e6:.3g} ± {self.drift_std * 1e6:.2g} ppm"
+            f", clocks drift by {with_std(self.drift * 1e6, self.drift_std * 1e6, '1')} ppm"
             if math.isfinite(self.drift)
             else ""
         )

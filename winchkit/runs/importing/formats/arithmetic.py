@@ -174,12 +174,12 @@ class _Parser:
             self._at += plain.end()
             self._skip()
             return _Value(value)
-        if name is None:
-            word = _OPERATOR.split(rest)[0].strip()
-            raise self._unknown(word)
+        name = name or _OPERATOR.split(rest)[0].strip()
+        column = self._table.column(name)
+        if column is None and name not in self._table.constants:
+            raise self._unknown(name)
         self._at += len(name)
         self._skip()
-        column = next((c for c in self._table.columns if c.source == name), None)
         if column is None:
             return _Value(self._table.constants[name])
         if column.texts is not None:
