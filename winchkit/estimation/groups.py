@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, isfinite, nan, sin
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from winchkit.units import dimension_of, parse
 if TYPE_CHECKING:
     from winchkit.schema.profiles.winch import WinchProfile
 
-_DAHL = "pulley-dahl"
+DAHL = "pulley-dahl"
 
 PULLEY_SLOTS = 5
 """Per pulley: cosine of the wrap, μ, σ, β, index of its group."""
@@ -48,7 +48,7 @@ class PulleyGroup:
 
         NaN where that of μ is not known.
         """
-        return self.std[0] * sum(2.0 * sin(wrap / 2.0) for wrap in self.wraps)
+        return self.std[0] * sliding_share(self.wraps)
 
     def check(self) -> None:
         """Raise UsageError for values outside of what a pulley can have."""
@@ -66,6 +66,11 @@ class PulleyGroup:
             raise UsageError(f"wraps of a pulley group are {self.wraps}; give at least one, in rad")
 
 
+def sliding_share(wraps: Iterable[float]) -> float:
+    """Friction of pulleys in motion over tension and μ, by their wrap angles, rad."""
+    return sum(2.0 * sin(wrap / 2.0) for wrap in wraps)
+
+
 def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
     """The pulleys of a winch with the friction of its effect ``pulley-dahl``; empty without one.
 
@@ -75,10 +80,10 @@ def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
     from winchkit.effects.bind import values_of
     from winchkit.effects.catalogue import load_catalogue
 
-    table = next((one for one in profile.effect if one.id == _DAHL), None)
+    table = next((one for one in profile.effect if one.id == DAHL), None)
     if table is None or not profile.pulley:
         return ()
-    effect = load_catalogue()[_DAHL]
+    effect = load_catalogue()[DAHL]
     values, faults = values_of(effect, table)
     if faults:
         raise FileError(faults)
