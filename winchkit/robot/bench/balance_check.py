@@ -109,8 +109,8 @@ class BalanceCheck:
 class Sources:
     """Standard deviations of what a balance of n cables depends on, SI."""
 
-    friction: Array
-    """Of the readings by pulleys, as a share, (n,)."""
+    reading: Array
+    """Of the readings by cells and pulleys, as a share, (n,)."""
     exit_point: Array
     """(n, 3), m."""
     anchor_point: Array
@@ -139,7 +139,7 @@ class Sources:
         lengths = sensitivities(geometry, pose.position, pose.rotation)
         wound = (robot.lengths(pose) - robot.home_length) * self.winding
         length = np.sqrt(self.home**2 + wound**2 + (self.compliance * force) ** 2)
-        reading = np.sqrt((HELD**2 + self.friction**2) * force**2 + self.zero**2)
+        reading = np.hypot(self.reading * force, self.zero)
         columns = [pull * reading[:, None], by_length * length[:, None]]
         for name, own in (("exit_point", self.exit_point), ("anchor_point", self.anchor_point)):
             by_pose = by_length[..., None] * getattr(lengths, name)[:, None]
@@ -175,7 +175,7 @@ def sources_of(robot: Robot, wiring: RobotWiring, compliance: Array, *, describe
     centre = [_stated(robot, f"payload-centre.{k}", "length", CENTRE_STD) for k in "xyz"]
     radii = np.array([winch.drum.winding_radius for winch in robot.winches])
     return Sources(
-        np.array([_friction(winch) for winch in robot.winches]),
+        np.array([math.hypot(HELD, _friction(winch)) for winch in robot.winches]),
         _geometry(robot, "exit_point", "xyz"),
         _geometry(robot, "anchor_point", "xyz"),
         _geometry(robot, "home_length"),
@@ -188,7 +188,7 @@ def sources_of(robot: Robot, wiring: RobotWiring, compliance: Array, *, describe
 
 
 def check_of(
-    robot: Robot, sources: Sources, pose: Pose, force: Array, structure: Array, places: int = 1
+    robot: Robot, sources: Sources, pose: Pose, force: Array, structure: Array, *, places: int = 1
 ) -> BalanceCheck:
     """The check at k poses with planned forces (k, n), its scales at ``places`` of them."""
     chosen = np.unique(np.arange(places) * len(force) // places).tolist()

@@ -145,7 +145,7 @@ class Corrections:
         described = bool(np.all(self._elongation(angles, force[0]) > 0))
         compliance = (1.0 if known else SOFTER) / stiffness
         sources = sources_of(self.robot, self.wiring, compliance, described=described)
-        return check_of(self.robot, sources, pose, force, structure, _PLACES)
+        return check_of(self.robot, sources, pose, force, structure, places=_PLACES)
 
     def require_balance(self, check: BalanceCheck, force: Array) -> None:
         """Raise NotPermitted where a cell has no reading, or they contradict the weight."""

@@ -140,7 +140,7 @@ class ForceLoop:
         return np.asarray(np.mean(list(self._errors) or [self.error], axis=0))
 
     def aim(self, force: Array, check: BalanceCheck | None = None) -> None:
-        """Take another set-point, (n,), N, from the next cycle on, with its check; from any thread."""
+        """Take a set-point, (n,), N, with its check from the next cycle on; from any thread."""
         self._check = check or self._check
         self.force = force
 
