@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
 from math import cos, hypot, sin, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,13 +21,16 @@ from winchkit.robot import Pose, Robot, robot_of
 from winchkit.robot.bench.balance_check import MOST, Sources, check_of, sources_of
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import ForceLimits, null_space, quadratic
-from winchkit.schema.profiles.robot import FittedSpec
+from winchkit.schema.profiles.robot import FittedSpec, Point
 from winchkit.schema.read import read_robot
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.units import GRAVITY
 
 WIRING = RobotWiring("winding-device-8", 0.2, (60.0, 2000.0))
 MASS = 4.0
+EXITS: tuple[Point, ...] = ((-1.5, 0.0, 2.5), (1.4, 0.0, 2.2))
+ANCHORS: tuple[Point, ...] = ((-0.2, 0.0, 0.1), (0.25, 0.0, 0.12))
+CENTRE: Point = (0.02, 0.0, -0.05)
 
 
 def exact(count: int) -> Sources:
@@ -45,7 +49,7 @@ def test_a_point_mass_on_three_cables_is_judged_as_the_closed_form() -> None:
     std, heavier = 0.8, 0.3
     payload = np.array([heavier, 0.0, 0.0, 0.0])
     sources = replace(exact(3), payload=payload, zero=std)
-    check = check_of(robot, sources, robot.home, force, robot.structure(robot.home))
+    check = check_of(robot, sources, robot.home, force)
     along, spread = 1 / (3 * upward), (heavier * GRAVITY / std) ** 2
     for deviation in (np.array([1.0, 0.0, 0.0]), np.array([0.3, -0.7, 0.1]), np.ones(3)):
         sum_along = along * float(deviation.sum())
@@ -60,15 +64,14 @@ class Plate:
     """A plate on two cables in the plane of x and z, whose rest is that of plane statics."""
 
     def __init__(self) -> None:
-        self.exits = np.array([[-1.5, 0.0, 2.5], [1.4, 0.0, 2.2]])
-        self.anchors = np.array([[-0.2, 0.0, 0.1], [0.25, 0.0, 0.12]])
-        self.centre, self.mass = np.array([0.02, 0.0, -0.05]), MASS
+        self.exits, self.anchors = np.array(EXITS), np.array(ANCHORS)
+        self.centre, self.mass = np.array(CENTRE), MASS
         self.robot = small_robot(
-            [tuple(row) for row in self.exits.tolist()],
-            [tuple(row) for row in self.anchors.tolist()],
+            EXITS,
+            ANCHORS,
             ("x", "z", "pitch"),
-            mass=self.mass,
-            center_of_mass=tuple(self.centre.tolist()),
+            mass=MASS,
+            center_of_mass=CENTRE,
             inertia=(0.02, 0.04, 0.03),
         )
         rest = rest_poses(self.robot, self.robot.home)
@@ -110,7 +113,8 @@ def _moved(name: str, line: int, axis: int) -> Callable[[Plate, float], Sources]
         array[line, axis] += size
         std = np.zeros((2, 3))
         std[line, axis] = size
-        return replace(exact(2), **{name: std})
+        changed: dict[str, Any] = {name: std}
+        return replace(exact(2), **changed)
 
     return apply
 
@@ -154,8 +158,7 @@ def test_an_error_of_one_standard_deviation_of_a_hanging_plate_is_found_as_one(
     plate = Plate()
     assert plate.forces() == pytest.approx(plate.force, abs=1e-7)
     sources = error(plate, 1e-5)
-    structure = plate.robot.structure(plate.pose)
-    check = check_of(plate.robot, sources, plate.pose, plate.force[None], structure)
+    check = check_of(plate.robot, sources, plate.pose, plate.force[None])
     assert check.size(0, plate.forces() - plate.force) == pytest.approx(1.0, rel=0.02)
 
 
@@ -175,7 +178,7 @@ def test_usual_friction_in_all_cables_and_any_preload_trip_nothing(
 ) -> None:
     robot, structure, force = platform()
     sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=False)
-    check = check_of(robot, sources, robot.home, force[None], structure[None])
+    check = check_of(robot, sources, robot.home, force[None])
     # Three pulleys with wraps of 90, 180 and 90 degrees and a friction of 0.02.
     friction = 0.02 * (2 * sqrt(2) + 2) * force
     readings = np.array(signs) * friction + preload * null_space(structure)[:, 0]
@@ -192,7 +195,7 @@ def test_a_yaw_of_a_degree_is_explained_and_its_least_norm_forces_are_not() -> N
     shown = quadratic(true, weight, ForceLimits(*WIRING.tension)).value
     _, structure, force = platform()
     sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=False)
-    check = check_of(robot, sources, robot.home, force[None], structure[None])
+    check = check_of(robot, sources, robot.home, force[None])
     null = null_space(structure)
     least = shown - force - null @ (null.T @ (shown - force))
     assert np.abs(least).max() > 0.1 * force.mean()
@@ -202,7 +205,7 @@ def test_a_yaw_of_a_degree_is_explained_and_its_least_norm_forces_are_not() -> N
 def test_words_name_what_explains_and_nothing_where_two_cells_are_wrong() -> None:
     robot, structure, force = platform()
     sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=False)
-    check = check_of(robot, sources, robot.home, force[None], structure[None])
+    check = check_of(robot, sources, robot.home, force[None])
     two = 1500.0 * (np.eye(8)[0] - np.eye(8)[4])
     assert "explain" not in check.words(0, two)[1]
     heavier = -np.linalg.pinv(structure) @ robot.weight(robot.home)[0] * 0.5
@@ -224,7 +227,7 @@ def test_a_calibrated_robot_with_known_friction_sees_smaller_errors() -> None:
         sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=bool(fitted))
         if fitted:  # with `pulley-dahl` of 0.0128 and a standard deviation of a fifth
             sources = replace(sources, reading=np.full(8, hypot(0.01, 0.0124)))
-        check = check_of(robot, sources, robot.home, force[None], structure[None])
+        check = check_of(robot, sources, robot.home, force[None])
         cell = max(MOST / check.size(0, one) for one in np.eye(8))
         lifted = -np.linalg.pinv(structure) @ robot.weight(robot.home)[0]
         seen.append([cell / force.mean(), MOST / check.size(0, lifted)])

@@ -47,7 +47,7 @@ def structure() -> Array:
 def check() -> BalanceCheck:
     wiring = RobotWiring("winding-device-8", 0.2, (60.0, 2000.0))
     sources = sources_of(ROBOT, wiring, 1 / STIFFNESS, described=False)
-    return check_of(ROBOT, sources, ROBOT.home, WANTED[None], ROBOT.structure(ROBOT.home))
+    return check_of(ROBOT, sources, ROBOT.home, WANTED[None])
 
 
 class Cables:

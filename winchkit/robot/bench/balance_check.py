@@ -161,8 +161,8 @@ class Sources:
         """Inertial wrenches of the swinging, (p, 6, 6); a platform without a moment of inertia has
         its mass at its anchor points."""
         mass, lever = robot.platform.mass, 1.0 / wrench_scale(robot.geometry)[3]
-        inertia = robot.platform.inertia or (mass * lever**2,) * 3
-        platform = replace(robot.platform, inertia=inertia)
+        there = mass * lever**2
+        platform = replace(robot.platform, inertia=robot.platform.inertia or (there, there, there))
         return mass_matrix(platform, pose.rotation) * self.inertial
 
 
@@ -188,13 +188,13 @@ def sources_of(robot: Robot, wiring: RobotWiring, compliance: Array, *, describe
 
 
 def check_of(
-    robot: Robot, sources: Sources, pose: Pose, force: Array, structure: Array, *, places: int = 1
+    robot: Robot, sources: Sources, pose: Pose, force: Array, *, places: int = 1
 ) -> BalanceCheck:
     """The check at k poses with planned forces (k, n), its scales at ``places`` of them."""
     chosen = np.unique(np.arange(places) * len(force) // places).tolist()
     load = -weight_by_payload(robot.platform, pose[chosen].rotation)[..., 0]
     whiten = sources.at(robot, pose[chosen], force[chosen])
-    return BalanceCheck(robot.names, structure, load, whiten)
+    return BalanceCheck(robot.names, robot.structure(pose), load, whiten)
 
 
 def declared_friction(winch: WinchProfile) -> float:

@@ -80,11 +80,12 @@ class Corrections:
         *,
         axial_stiffness: float | None = None,
         path: PathForces | None = None,
-        check: BalanceCheck | None = None,
+        watched: bool = True,
     ) -> ForceLoop:
-        """The control of the forces (n,) at a pose, at motor angles (n,), or along a ``path``.
+        """The control of the forces (1, n) at a pose, at motor angles (n,), or along a ``path``.
 
-        ``check``: by which readings that contradict the weight trip the bench.
+        A path has k poses and forces (k, n). ``watched``: whether readings that contradict the
+        weight trip the bench.
 
         Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
         """
@@ -100,13 +101,14 @@ class Corrections:
             newest = cell.latest
             filtered = 0.0 if newest is None else newest.t_receive - newest.t_sample
             delays.append(filtered + cell.period)
-        self.require_torque(force, angles)
+        start, first = pose[:1], force[0]
+        self.require_torque(first, angles)
         late = max(winch.wiring.limits.response_time for winch in self.winches)
-        stiffness, known = self._stiffness(pose, force, angles, axial_stiffness)
+        stiffness, known = self._stiffness(start, first, angles, axial_stiffness)
         setting = ForceSetting(
             self.robot.names,
-            force,
-            self.balanced(pose),
+            first,
+            self.balanced(start),
             stiffness,
             known,
             max(delays) + late,
@@ -115,7 +117,7 @@ class Corrections:
             min(winch.wiring.limits.acceleration for winch in self.winches),
             np.array([declared_friction(line.profile) for line in self.robot.lines]),
             _SLACK * self.wiring.tension[0],
-            check,
+            self.check(pose, force, angles, stiffness, known=known) if watched else None,
         )
         return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
 
@@ -125,29 +127,24 @@ class Corrections:
         balanced = np.array([null @ null.T for null in map(null_space, structure)])
         feeds = not self._elongation(angles, planned.force[0]).any()
         path = PathForces(clock, float(planned.time[1]), planned.force, balanced, feeds)
-        check = self.check(planned.pose, planned.force, angles, structure)
-        start = planned.pose[:1]
-        loop = self.force_loop(
-            start, planned.force[0], angles, _ALONG_SPEED, path=path, check=check
-        )
+        loop = self.force_loop(planned.pose, planned.force, angles, _ALONG_SPEED, path=path)
         lasts = clock.duration + _ALONG_END
         return self.correction([loop], TRAVEL, _ALONG_SPEED, lambda elapsed, _: elapsed < lasts)
 
     def check(
-        self, pose: Pose, force: Array, angles: Array, structure: Array | None = None
+        self, pose: Pose, force: Array, angles: Array, stiffness: Array, *, known: bool
     ) -> BalanceCheck:
-        """What readings at poses with planned forces (k, n) are compared with.
+        """What readings at k poses with planned forces (k, n) are compared with.
 
-        ``angles`` (n,): of the motors at the first. ``structure`` (k, 6, n): where it is known.
+        ``angles``, ``stiffness`` (n,): motor angles at the first, and of the cables, N/m; upper
+        bounds where they are not ``known``.
         """
-        structure = self.robot.structure(pose) if structure is None else structure
-        stiffness, known = self._stiffness(pose[:1], force[0], angles, None)
         described = bool(np.all(self._elongation(angles, force[0]) > 0))
         compliance = (1.0 if known else SOFTER) / stiffness
         sources = sources_of(self.robot, self.wiring, compliance, described=described)
-        return check_of(self.robot, sources, pose, force, structure, places=_PLACES)
+        return check_of(self.robot, sources, pose, force, places=_PLACES)
 
-    def require_balance(self, check: BalanceCheck, force: Array) -> None:
+    def require_balance(self, loop: ForceLoop) -> None:
         """Raise NotPermitted where a cell has no reading, or they contradict the weight."""
         shown = self.readings(self.bench.clock.now())
         names = np.array(self.robot.names)
@@ -156,9 +153,10 @@ class Corrections:
                 f"winch {', '.join(names[~np.isfinite(shown)])}: the load cell has no valid "
                 "reading; look at its line and its quality, e.g. `winchkit monitor`"
             )
-        if check.size(0, shown - force) > MOST:
+        check, deviation = loop.setting.check, shown - loop.setting.force
+        if check is not None and check.size(0, deviation) > MOST:
             raise NotPermitted(
-                f"{check.words(0, shown - force)[1]}; look for a cell that was tared under load, a "
+                f"{check.words(0, deviation)[1]}; look for a cell that was tared under load, a "
                 "wrong cell, and the mass of the platform in the robot's profile"
             )
 

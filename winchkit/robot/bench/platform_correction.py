@@ -194,14 +194,11 @@ class HeldPlatform(PlatformPose):
         if preload is not None:
             here = self.pose
             force = self._preloaded(here, preload)
-            angles = self._angles()[0]
-            check = self.corrections.check(here, force[None], angles)
-            loops.append(
-                self.corrections.force_loop(
-                    here, force, angles, speed, axial_stiffness=axial_stiffness, check=check
-                )
+            loop = self.corrections.force_loop(
+                here, force[None], self._angles()[0], speed, axial_stiffness=axial_stiffness
             )
-            self.corrections.require_balance(check, force)
+            self.corrections.require_balance(loop)
+            loops.append(loop)
         if pose is not None:
             require_type(pose, Pose, "pose")
             loops.append(self.corrections.pose_loop(pose, self._bench.tracker, travel))
@@ -253,7 +250,9 @@ class HeldPlatform(PlatformPose):
         here, angles = self.pose, self._angles()[0]
         force = self._preloaded(here, preload)
         self.corrections.require_torque(force, angles)
-        loop.aim(force, self.corrections.check(here, force[None], angles))
+        own = loop.setting
+        check = self.corrections.check(here, force[None], angles, own.stiffness, known=own.known)
+        loop.aim(force, check)
 
     def held(self) -> dict[str, Any]:
         """What is held, or was held last, and how far the platform is from it.
@@ -334,7 +333,12 @@ class HeldPlatform(PlatformPose):
     ) -> list[CableCorrection]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
         loop = self.corrections.force_loop(
-            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
+            pose,
+            force[None],
+            self._angles()[0],
+            speed,
+            axial_stiffness=axial_stiffness,
+            watched=False,
         )
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration
