@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
+from functools import cache
 from math import cos, hypot, sin, sqrt
 from typing import Any
 
@@ -162,10 +163,18 @@ def test_an_error_of_one_standard_deviation_of_a_hanging_plate_is_found_as_one(
     assert check.size(0, plate.forces() - plate.force) == pytest.approx(1.0, rel=0.02)
 
 
-def platform(fitted: FittedSpec | None = None) -> tuple[Robot, Array, Array]:
+@cache
+def platform(*, calibrated: bool = False) -> tuple[Robot, Array, Array]:
     """The winding device's robot at home with forces that balance."""
     profile = read_robot(find("profiles", "winding-device-8"))
-    robot = robot_of(replace(profile, fitted=fitted))
+    points = [
+        f"{line}.{name}.{axis}"
+        for line in "12345678"
+        for name in ("exit_point", "anchor_point")
+        for axis in "xyz"
+    ]
+    fitted = FittedSpec(date(2026, 11, 29), std=dict.fromkeys(points, "0.2 mm"))
+    robot = robot_of(replace(profile, fitted=fitted if calibrated else None))
     structure = robot.structure(robot.home)[0]
     limits = ForceLimits(*WIRING.tension)
     return robot, structure, quadratic(structure, robot.weight(robot.home)[0], limits).value
@@ -214,21 +223,14 @@ def test_words_name_what_explains_and_nothing_where_two_cells_are_wrong() -> Non
 
 def test_a_calibrated_robot_with_known_friction_sees_smaller_errors() -> None:
     """The sizes that docs/safety.md states, as shares of the mean force and of the weight."""
-    points = [
-        f"{line}.{name}.{axis}"
-        for line in "12345678"
-        for name in ("exit_point", "anchor_point")
-        for axis in "xyz"
-    ]
-    calibrated = FittedSpec(date(2026, 11, 29), std=dict.fromkeys(points, "0.2 mm"))
     seen = []
-    for fitted in (None, calibrated):
-        robot, structure, force = platform(fitted)
-        sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=bool(fitted))
-        if fitted:  # with `pulley-dahl` of 0.0128 and a standard deviation of a fifth
+    for calibrated in (False, True):
+        robot, structure, force = platform(calibrated=calibrated)
+        sources = sources_of(robot, WIRING, np.full(8, 1e-5), described=calibrated)
+        if calibrated:  # with `pulley-dahl` of 0.0128 and a standard deviation of a fifth
             sources = replace(sources, reading=np.full(8, hypot(0.01, 0.0124)))
         check = check_of(robot, sources, robot.home, force[None])
         cell = max(MOST / check.size(0, one) for one in np.eye(8))
         lifted = -np.linalg.pinv(structure) @ robot.weight(robot.home)[0]
         seen.append([cell / force.mean(), MOST / check.size(0, lifted)])
-    assert np.array(seen) == pytest.approx(np.array([[0.62, 0.23], [0.2, 0.2]]), abs=0.01)
+    assert np.array(seen) == pytest.approx(np.array([[0.61, 0.22], [0.195, 0.177]]), abs=5e-3)

@@ -186,7 +186,7 @@ def test_a_cell_that_jumps_by_more_than_is_explained_trips_and_moves_no_cable_fa
     for _ in range(DELAY + 1):
         assert not cables.trips, "the reading has not come yet"
         cables.step(STIFFNESS)
-    for _ in range(round(0.1 / CYCLE) + 1):
+    for _ in range(round(0.4 / CYCLE)):  # 0.1 s times the logarithm of 20, and a cycle
         cables.step(STIFFNESS)
     kinds = [trip.kind for trip in cables.trips]
     if share < 1.0:

@@ -8,7 +8,7 @@ B for the standard deviation of each:
 * mass and centre of mass of the platform;
 * exit and anchor points, and the cable lengths: home, winding radius, elongation that the profile
   does not describe. They act through the pose by the lengths, x, too: ∂x/∂L = J⁺ with J = −A;
-* inertial forces of a platform that swings.
+* inertial forces of a platform that swings, in low-passed readings.
 
 |z| is least for z = Bᵀ (B Bᵀ)⁻¹ r, with |z|² = rᵀ (B Bᵀ)⁻¹ r (Mahalanobis distance): the standard
 deviations that all sources together need at least. A hanging platform rests where its weight
@@ -52,6 +52,9 @@ and screws (rule of thumb)."""
 _DESCRIBED = 0.2
 """Standard deviation of an elongation that the profile describes, as a share: EA of a data sheet
 against a cable in use (rule of thumb)."""
+_SWINGING = 0.1
+"""Share of the accelerations of [robot] as the standard deviation of what is left of a swinging in
+low-passed forces: at most 0.6 of them at 2 Hz, from the first cycle on (5.7 times this)."""
 _BARE = math.sqrt(2)
 """2 sin(wrap/2) of the guide through which a cable without declared pulleys leaves its winch."""
 _RANK = 1e-6
@@ -182,7 +185,7 @@ def sources_of(robot: Robot, wiring: RobotWiring, compliance: Array, *, describe
         _geometry(robot, "winding_radius") / radii,
         compliance * (_DESCRIBED if described else 1.0),
         np.array([mass, *centre]),
-        np.repeat([wiring.acceleration, wiring.rotation_acceleration], 3),
+        _SWINGING * np.repeat([wiring.acceleration, wiring.rotation_acceleration], 3),
         _ZERO * wiring.tension[1],
     )
 

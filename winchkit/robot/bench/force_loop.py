@@ -35,9 +35,11 @@ from winchkit.robot.bench.balance_check import MOST, BalanceCheck
 from winchkit.robot.bench.correction import Latch
 from winchkit.robot.bench.path_time import PathTime
 
-_WATCHED = 0.1
-"""Time for which a contradiction or a slack cable lasts before it trips, s: delays of eight cells
-and the lag behind a motion's acceleration are over."""
+_SLACK_TIME = 0.1
+"""A swinging platform relieves a cable for less, s."""
+_LOW_PASS = 0.1
+"""Of the deviations that are compared with the weight, s: a platform that swings at 2 Hz or faster
+shows less than two thirds of its acceleration, differences of the cells' delays are over."""
 _EXPLAINED = 2.0
 """Standard deviations of the readings, by the friction that is not known, within which a deviation
 is not corrected."""
@@ -132,7 +134,8 @@ class ForceLoop:
         self._errors: deque[Array] = deque(maxlen=_SHOWN)
         self._check = setting.check
         self._taut = np.zeros(len(setting.names), dtype=bool)
-        self._since = {"slack": math.inf, "balance": math.inf}
+        self._slack_since = self._seen = math.inf
+        self._deviation: Array | None = None
 
     @property
     def mean_error(self) -> Array:
@@ -208,21 +211,21 @@ class ForceLoop:
         """Trip where readings contradict the weight, or a cable has become slack."""
         slack = self._taut & (shown < self.setting.slack)
         self._taut |= shown >= self.setting.slack
-        if self._lasts("slack", now, over=bool(slack.any())):
+        self._slack_since = min(self._slack_since, now) if slack.any() else math.inf
+        if now - self._slack_since >= _SLACK_TIME:
             worst = int(np.argmin(np.where(slack, shown, math.inf)))
             words = (
                 f"the cable force is {shown[worst]:.1f} N, below {self.setting.slack:.1f} N (half "
-                f"of the lower limit `tension` of [robot]) for {_WATCHED:g} s, planned is "
+                f"of the lower limit `tension` of [robot]) for {_SLACK_TIME:g} s, planned is "
                 f"{force[worst]:.1f} N; look for a broken or slack cable and a wrong load cell, "
                 "then reset"
             )
             self._latch(Trip("cable forces", check.names[worst], words, latches=True))
         deviation = shown - force
-        if self._lasts("balance", now, over=check.size(place, deviation) > MOST):
-            name, found = check.words(place, deviation)
-            words = f"{found}; they did for {_WATCHED:g} s; look for it, then reset"
+        low = deviation if self._deviation is None else self._deviation
+        low = low + (1.0 - math.exp(min(0.0, self._seen - now) / _LOW_PASS)) * (deviation - low)
+        self._deviation, self._seen = low, now
+        if check.size(place, low) > MOST:
+            name, found = check.words(place, low)
+            words = f"{found}; look for it, then reset"
             self._latch(Trip("cable forces", name, words, latches=True))
-
-    def _lasts(self, what: str, now: float, *, over: bool) -> bool:
-        self._since[what] = min(self._since[what], now) if over else math.inf
-        return now - self._since[what] >= _WATCHED
