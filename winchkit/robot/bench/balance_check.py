@@ -164,7 +164,7 @@ class Sources:
         """Inertial wrenches of the swinging, (p, 6, 6); a platform without a moment of inertia has
         its mass at its anchor points."""
         mass, lever = robot.platform.mass, 1.0 / wrench_scale(robot.geometry)[3]
-        there = mass * lever**2
+        there = 2 / 3 * mass * lever**2
         platform = replace(robot.platform, inertia=robot.platform.inertia or (there, there, there))
         return mass_matrix(platform, pose.rotation) * self.inertial
 
