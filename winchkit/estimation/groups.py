@@ -13,7 +13,7 @@ from winchkit.units import dimension_of, parse
 if TYPE_CHECKING:
     from winchkit.schema.profiles.winch import WinchProfile
 
-DAHL = "pulley-dahl"
+_DAHL = "pulley-dahl"
 
 PULLEY_SLOTS = 5
 """Per pulley: cosine of the wrap, μ, σ, β, index of its group."""
@@ -80,10 +80,10 @@ def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
     from winchkit.effects.bind import values_of
     from winchkit.effects.catalogue import load_catalogue
 
-    table = next((one for one in profile.effect if one.id == DAHL), None)
+    table = next((one for one in profile.effect if one.id == _DAHL), None)
     if table is None or not profile.pulley:
         return ()
-    effect = load_catalogue()[DAHL]
+    effect = load_catalogue()[_DAHL]
     values, faults = values_of(effect, table)
     if faults:
         raise FileError(faults)

@@ -25,16 +25,15 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.bench.control.tension_control import HELD
-from winchkit.effects.catalogue import load_catalogue
+from winchkit.effects.on_tension.pulley import PULLEY_DAHL
 from winchkit.estimation.dahl import UNIFORM
-from winchkit.estimation.groups import DAHL, groups_of, sliding_share
+from winchkit.estimation.groups import groups_of, sliding_share
 from winchkit.robot.dynamics.dynamics import mass_matrix
 from winchkit.robot.forces.balance import hanging_balance, wrench_scale
 from winchkit.robot.geometry.kinematics import Pose, sensitivities
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import weight_by_payload
-from winchkit.robot.identification.parameters import CENTRE_STD
-from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec
+from winchkit.schema.profiles.robot import CENTRE_STD, PRIORS, PriorName, PriorSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.units import parse
@@ -211,7 +210,7 @@ def _friction(winch: WinchProfile) -> float:
     declared = declared_friction(winch)
     if declared > 0:
         return declared
-    usual = load_catalogue()[DAHL].parameter("friction").typical
+    usual = PULLEY_DAHL.parameter("friction").typical
     return UNIFORM * usual * max(sliding_share([pulley.wrap for pulley in winch.pulley]), _BARE)
 
 
