@@ -210,7 +210,8 @@ def test_a_cable_that_becomes_slack_trips_although_the_others_carry_the_weight(
     # The platform has moved to where the others balance, so that no wrench is left over.
     balance = replace(check(), whiten=np.zeros_like(check().whiten))
     cables = Cables(structure, taut, balance=balance)
-    cables.step(STIFFNESS)
+    for _ in range(5):  # the first one only starts
+        cables.step(STIFFNESS)
     cables.read = lambda: broken
     for _ in range(DELAY + round(0.1 / CYCLE) + 2):
         cables.step(STIFFNESS)

@@ -226,6 +226,6 @@ class ForceLoop:
         low = low + (1.0 - math.exp(min(0.0, self._seen - now) / _LOW_PASS)) * (deviation - low)
         self._deviation, self._seen = low, now
         if check.size(place, low) > MOST:
-            name, found = check.words(place, low)
+            name, found = check.words(place, deviation)
             words = f"{found}; look for it, then reset"
             self._latch(Trip("cable forces", name, words, latches=True))
