@@ -15,7 +15,7 @@ from winchkit.errors import UsageError
 from winchkit.estimation.groups import PULLEY_SLOTS, PulleyGroup, flat_covariances, flat_pulleys
 from winchkit.estimation.kernels import PLAIN, STATE_SLOTS, Kernels
 
-_UNIFORM = 3.0**-0.5
+UNIFORM = 3.0**-0.5
 """Standard deviation of a uniform distribution from −1 to 1: friction that is unknown within its
 limit."""
 
@@ -150,7 +150,7 @@ class DahlEstimator:
             p = PULLEY_SLOTS * j
             cosine, friction = pulleys[p], pulleys[p + 1]
             limit = friction * abs(tension) * sqrt(max(0.0, 2.0 - 2.0 * cosine))
-            self._state[STATE_SLOTS * j + STATE_SLOTS - 1] = _UNIFORM * limit
+            self._state[STATE_SLOTS * j + STATE_SLOTS - 1] = UNIFORM * limit
         value, variance = self._advance(
             tension, 0.0, self._state, self._pulleys, self._covariances, self._sums
         )

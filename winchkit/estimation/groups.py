@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, isfinite, nan, sin
 from typing import TYPE_CHECKING
@@ -48,7 +48,7 @@ class PulleyGroup:
 
         NaN where that of μ is not known.
         """
-        return self.std[0] * sum(2.0 * sin(wrap / 2.0) for wrap in self.wraps)
+        return self.std[0] * sliding_share(self.wraps)
 
     def check(self) -> None:
         """Raise UsageError for values outside of what a pulley can have."""
@@ -64,6 +64,11 @@ class PulleyGroup:
                 )
         if not self.wraps or not all(isfinite(wrap) and wrap >= 0 for wrap in self.wraps):
             raise UsageError(f"wraps of a pulley group are {self.wraps}; give at least one, in rad")
+
+
+def sliding_share(wraps: Iterable[float]) -> float:
+    """Friction of pulleys in motion over tension and μ, by their wrap angles, rad."""
+    return sum(2.0 * sin(wrap / 2.0) for wrap in wraps)
 
 
 def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:

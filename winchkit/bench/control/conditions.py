@@ -545,9 +545,10 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition(
         "cable forces",
-        "measured cable forces of a platform against its weight, while they are held, or along a "
-        "motion with `tension_trim`",
-        "a fifth of the mean set-point, for 0.1 s",
+        "measured cable forces of a platform against its weight, and of a cable that was taut, "
+        "while they are held, or along a motion with `tension_trim`",
+        "5.7 standard deviations (see Cable forces against the weight), low-passed over 0.1 s; "
+        "half of the lower limit of `tension` of [robot] for 0.1 s",
     ),
     BenchCondition(
         "tracker age",

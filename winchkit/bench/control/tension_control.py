@@ -31,7 +31,7 @@ _STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
 _SLACK_TIME = 0.2
 """A load that swings relieves its cable for less, s."""
-_SOFTER = 10.0
+SOFTER = 10.0
 """Times by which a cable with its structure may be softer than the bound of its stiffness: of a
 fibre cable on a frame against its own elasticity by the data sheet."""
 _STEEL = 210e9
@@ -113,7 +113,7 @@ class BrokenCable:
         if self._first is None:
             self._first = tension
         self._taut = self._taut or tension >= setting.slack
-        rise = _SOFTER * max(0.0, tension - self._first)
+        rise = SOFTER * max(0.0, tension - self._first)
         explained = (setting.tension + rise) / setting.stiffness
         slack = tension < setting.slack and (self._taut or wound > explained)
         self._since = min(self._since, now) if slack else math.inf

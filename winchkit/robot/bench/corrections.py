@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.bench.control.tension_control import greatest_stiffness
+from winchkit.bench.control.tension_control import SOFTER, greatest_stiffness
 from winchkit.bench.host import WinchHost
 from winchkit.bench.tracker import TrackerReceiver
 from winchkit.bench.winch import Winch
 from winchkit.errors import NotPermitted
-from winchkit.estimation.groups import groups_of
+from winchkit.robot.bench.balance_check import (
+    MOST,
+    BalanceCheck,
+    check_of,
+    declared_friction,
+    sources_of,
+)
 from winchkit.robot.bench.correction import Bounds, Correction, Loop
-from winchkit.robot.bench.force_loop import UNBALANCED, ForceLoop, ForceSetting, PathForces
+from winchkit.robot.bench.force_loop import ForceLoop, ForceSetting, PathForces
 from winchkit.robot.bench.path_time import PathTime
 from winchkit.robot.bench.pose_loop import PoseLoop, TrackerLimits, TrackerWatch
 from winchkit.robot.bench.trajectory import PlatformTrajectory
@@ -24,7 +29,6 @@ from winchkit.robot.forces.force_distribution import null_space
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.profiles.instruments import UNKNOWN
-from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.robot_bench import RobotWiring
 
 TRAVEL = 0.01
@@ -36,12 +40,11 @@ _LISTENS = 3
 """Longest ages of a pose for which a tracker that shows nothing is waited for."""
 _PROBE = 1.0
 """Force by which the elasticity of a cable is tried in the profile, N."""
-
-
-def _unknown(profile: WinchProfile) -> float:
-    """Standard deviation of a cell's reading by its pulleys, as a share; 0 where none is known."""
-    known = sum(group.sliding_std for group in groups_of(profile))
-    return known if math.isfinite(known) else 0.0
+_SLACK = 0.5
+"""Share of the lower limit of the forces, below which a cable counts as slack: as of the set force
+of a single winch."""
+_PLACES = 200
+"""Of a motion at which the uncertainty of the balance is computed: it changes with the pose."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,10 @@ class Corrections:
         path: PathForces | None = None,
         watched: bool = True,
     ) -> ForceLoop:
-        """The control of the forces (n,) at a pose, at motor angles (n,), or along a ``path``.
+        """The control of the forces (1, n) at a pose, at motor angles (n,), or along a ``path``.
 
-        ``watched``: whether readings that contradict the weight trip the bench.
+        A path has k poses and forces (k, n). ``watched``: whether readings that contradict the
+        weight trip the bench.
 
         Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
         """
@@ -97,21 +101,23 @@ class Corrections:
             newest = cell.latest
             filtered = 0.0 if newest is None else newest.t_receive - newest.t_sample
             delays.append(filtered + cell.period)
-        self.require_torque(force, angles)
+        start, first = pose[:1], force[0]
+        self.require_torque(first, angles)
         late = max(winch.wiring.limits.response_time for winch in self.winches)
-        stiffness, known = self._stiffness(pose, force, angles, axial_stiffness)
+        stiffness, known = self._stiffness(start, first, angles, axial_stiffness)
         setting = ForceSetting(
             self.robot.names,
-            force,
-            self.balanced(pose),
+            first,
+            self.balanced(start),
             stiffness,
             known,
             max(delays) + late,
             float(np.mean(delays)) + self.bench.loop.cycle + late / 2,
             speed,
             min(winch.wiring.limits.acceleration for winch in self.winches),
-            np.array([_unknown(line.profile) for line in self.robot.lines]),
-            watched,
+            np.array([declared_friction(line.profile) for line in self.robot.lines]),
+            _SLACK * self.wiring.tension[0],
+            self.check(pose, force, angles, stiffness, known=known) if watched else None,
         )
         return ForceLoop(setting, self.readings, self.bench.loop.supervisor.latch, path)
 
@@ -121,12 +127,24 @@ class Corrections:
         balanced = np.array([null @ null.T for null in map(null_space, structure)])
         feeds = not self._elongation(angles, planned.force[0]).any()
         path = PathForces(clock, float(planned.time[1]), planned.force, balanced, feeds)
-        start = planned.pose[:1]
-        loop = self.force_loop(start, planned.force[0], angles, _ALONG_SPEED, path=path)
+        loop = self.force_loop(planned.pose, planned.force, angles, _ALONG_SPEED, path=path)
         lasts = clock.duration + _ALONG_END
         return self.correction([loop], TRAVEL, _ALONG_SPEED, lambda elapsed, _: elapsed < lasts)
 
-    def require_balance(self, pose: Pose, force: Array) -> None:
+    def check(
+        self, pose: Pose, force: Array, angles: Array, stiffness: Array, *, known: bool
+    ) -> BalanceCheck:
+        """What readings at k poses with planned forces (k, n) are compared with.
+
+        ``angles``, ``stiffness`` (n,): motor angles at the first, and of the cables, N/m; upper
+        bounds where they are not ``known``.
+        """
+        described = bool(np.all(self._elongation(angles, force[0]) > 0))
+        compliance = (1.0 if known else SOFTER) / stiffness
+        sources = sources_of(self.robot, self.wiring, compliance, described=described)
+        return check_of(self.robot, sources, pose, force, places=_PLACES)
+
+    def require_balance(self, loop: ForceLoop) -> None:
         """Raise NotPermitted where a cell has no reading, or they contradict the weight."""
         shown = self.readings(self.bench.clock.now())
         names = np.array(self.robot.names)
@@ -135,13 +153,11 @@ class Corrections:
                 f"winch {', '.join(names[~np.isfinite(shown)])}: the load cell has no valid "
                 "reading; look at its line and its quality, e.g. `winchkit monitor`"
             )
-        unbalanced = shown - force - self.balanced(pose) @ (shown - force)
-        worst, limit = int(np.argmax(np.abs(unbalanced))), UNBALANCED * float(force.mean())
-        if abs(unbalanced[worst]) > limit:
+        check, deviation = loop.setting.check, shown - loop.setting.force
+        if check is not None and check.size(0, deviation) > MOST:
             raise NotPermitted(
-                f"the load cells and the weight contradict each other by {unbalanced[worst]:+.0f} "
-                f"N in cable {names[worst]} (limit {limit:.0f} N); look for a cell that was tared "
-                "under load, a wrong cell, and the mass of the platform in the robot's profile"
+                f"{check.words(0, deviation)[1]}; look for a cell that was tared under load, a "
+                "wrong cell, and the mass of the platform in the robot's profile"
             )
 
     def pose_loop(self, goal: Pose, tracker: TrackerReceiver | None, travel: float) -> PoseLoop:
@@ -151,6 +167,7 @@ class Corrections:
         the platform farther from the goal than the travel of the cables (m) reaches.
         """
         robot, wiring = self.robot, self.wiring
+        by_pose = -robot.structure(goal)[0].T
         spec = robot.profile.instrument.tracker
         if tracker is None or wiring.tracker is None:
             raise NotPermitted(
@@ -173,7 +190,7 @@ class Corrections:
         limits = TrackerLimits(wiring.tracker.max_age, wiring.speed, wiring.rotation_speed)
         loop = PoseLoop(
             goal,
-            -robot.structure(goal)[0].T,
+            by_pose,
             lambda: tracker.newest,
             TrackerWatch(limits),
             self.bench.loop.supervisor.latch,
@@ -184,7 +201,7 @@ class Corrections:
             clock.sleep(_LISTENS * age)  # it may listen from now on only
         newest = tracker.require(clock.now() - age, wiring.tracker.listen)[-1]
         loop.error = loop.deviation(newest)
-        way = -robot.structure(goal)[0].T @ loop.error
+        way = by_pose @ loop.error
         worst = int(np.argmax(np.abs(way)))
         if abs(way[worst]) > travel:
             off = float(np.linalg.norm(loop.error[:3]))

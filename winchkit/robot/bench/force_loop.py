@@ -13,12 +13,14 @@ The friction of pulleys between cell and platform is removed from the readings b
 profile. Where their standard deviation is declared, deviations that it explains are not corrected:
 the preload is not changed by what the cells do not know.
 
-The rest of the deviation, (1 − P)(f_s − f), is what the readings and the weight contradict each
-other by, whatever the preload is: a cell that jumps or stands still shows there.
+The rest of the deviation is a wrench, by which readings and weight contradict each other whatever
+the preload is: a cell that jumps or stands still shows there (:mod:`.balance_check`). A cable that
+breaks does not, since the platform moves to where the others balance: it is seen by its own force.
 """
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,14 +31,15 @@ from winchkit.arrays import Array
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.tension_control import LOOP
 from winchkit.model.trajectory import Trajectory, plan
+from winchkit.robot.bench.balance_check import MOST, BalanceCheck
 from winchkit.robot.bench.correction import Latch
 from winchkit.robot.bench.path_time import PathTime
 
-UNBALANCED = 0.2
-"""Share of the mean cable force by which the readings may miss the balance with the weight:
-friction of three pulleys, and a payload that is not declared, stay below (rule of thumb)."""
-_UNBALANCED_TIME = 0.1
-"""A swinging platform unbalances its cables for less, s."""
+_SLACK_TIME = 0.1
+"""A swinging platform relieves a cable for less, s."""
+_LOW_PASS = 0.1
+"""Of the deviations that are compared with the weight, s: a platform that swings at 2 Hz or faster
+shows less than two thirds of its acceleration, differences of the cells' delays are over."""
 _EXPLAINED = 2.0
 """Standard deviations of the readings, by the friction that is not known, within which a deviation
 is not corrected."""
@@ -71,8 +74,10 @@ class ForceSetting:
     """m/s^2."""
     unknown: Array
     """Standard deviation of the readings by the friction of the pulleys, as a share, (n,)."""
-    watched: bool = True
-    """Whether readings that contradict the weight trip the bench."""
+    slack: float
+    """Force below which a cable that was taut is slack or broken, N."""
+    check: BalanceCheck | None
+    """By which readings that contradict the weight trip the bench; None where they do not."""
 
 
 @dataclass(frozen=True)
@@ -89,19 +94,15 @@ class PathForces:
     feeds: bool
     """Whether their elongation is to be fed forward: the motor angles of the plan have none."""
 
-    def at(self, late: float) -> tuple[Array, Array]:
-        """Force and projection ``late`` s before the present time along the motion."""
-        index = self._index(late)
-        return self.force[index], self.balanced[index]
-
     @property
     def rate(self) -> Array:
         """Rate of the forces, (n,), N/s."""
-        first = min(self._index(0.0), len(self.force) - 2)
+        first = min(self.index(0.0), len(self.force) - 2)
         change = (self.force[first + 1] - self.force[first]) / self.step
         return np.asarray(change * (0.0 if self.clock.ended else self.clock.rate))
 
-    def _index(self, late: float) -> int:
+    def index(self, late: float) -> int:
+        """Step of the present time along the motion, less ``late`` s."""
         index = int((self.clock.now - late * self.clock.rate) / self.step)
         return max(0, min(index, len(self.force) - 1))
 
@@ -131,15 +132,19 @@ class ForceLoop:
         self.error = self._change
         """Missing forces that balance each other, beyond what friction explains, (n,), N."""
         self._errors: deque[Array] = deque(maxlen=_SHOWN)
-        self._unbalanced_since = float("inf")
+        self._check = setting.check
+        self._taut = np.zeros(len(setting.names), dtype=bool)
+        self._slack_since = self._seen = math.inf
+        self._deviation: Array | None = None
 
     @property
     def mean_error(self) -> Array:
         """Mean of the newest 50 of :attr:`error`, (n,); zero before the first."""
         return np.asarray(np.mean(list(self._errors) or [self.error], axis=0))
 
-    def aim(self, force: Array) -> None:
-        """Take another set-point, (n,), N, from the next cycle on; from any thread."""
+    def aim(self, force: Array, check: BalanceCheck | None = None) -> None:
+        """Take a set-point, (n,), N, with its check from the next cycle on; from any thread."""
+        self._check = check or self._check
         self.force = force
 
     def left(self, index: int) -> str:
@@ -151,15 +156,15 @@ class ForceLoop:
         shown = self._readings(now)
         if not np.isfinite(shown).all():
             return None
-        setting, force, projection = self.setting, self.force, self.setting.balanced
+        setting, force, projection, place = self.setting, self.force, self.setting.balanced, 0
         if self._path is not None:
-            force, projection = self._path.at(setting.lag)
+            place = self._path.index(setting.lag)
+            force, projection = self._path.force[place], self._path.balanced[place]
         elif force is not self._aimed:
             self._begin(time, force, shown)
-        missing = force - shown
-        balanced = projection @ missing
-        if setting.watched:
-            self._watch(now, missing - balanced, force)
+        if self._check is not None:
+            self._watch(now, self._check, place, shown, force)
+        balanced = projection @ (force - shown)
         self.error = self._beyond(
             balanced - self._change * (1.0 - self._share(time - setting.lag)[0]), projection, shown
         )
@@ -200,17 +205,27 @@ class ForceLoop:
         way, speed, _ = self._ramp.at(max(0.0, time - self._begun))
         return float(way) / self._ramp.distance, float(speed) / self._ramp.distance
 
-    def _watch(self, now: float, unbalanced: Array, force: Array) -> None:
-        """Trip where the readings contradict the weight."""
-        worst, limit = int(np.argmax(np.abs(unbalanced))), UNBALANCED * float(force.mean())
-        over = abs(unbalanced[worst]) > limit
-        self._unbalanced_since = min(self._unbalanced_since, now) if over else float("inf")
-        if now - self._unbalanced_since >= _UNBALANCED_TIME:
-            name = self.setting.names[worst]
+    def _watch(
+        self, now: float, check: BalanceCheck, place: int, shown: Array, force: Array
+    ) -> None:
+        """Trip where readings contradict the weight, or a cable has become slack."""
+        slack = self._taut & (shown < self.setting.slack)
+        self._taut |= shown >= self.setting.slack
+        self._slack_since = min(self._slack_since, now) if slack.any() else math.inf
+        if now - self._slack_since >= _SLACK_TIME:
+            worst = int(np.argmin(np.where(slack, shown, math.inf)))
             words = (
-                f"the load cells and the weight contradict each other by {-unbalanced[worst]:+.0f} "
-                f"N in cable {name} (limit {limit:.0f} N for {_UNBALANCED_TIME:g} s); look for a "
-                "wrong load cell, a load that is not declared and a cable that touches something, "
+                f"the cable force is {shown[worst]:.1f} N, below {self.setting.slack:.1f} N (half "
+                f"of the lower limit `tension` of [robot]) for {_SLACK_TIME:g} s, planned is "
+                f"{force[worst]:.1f} N; look for a broken or slack cable and a wrong load cell, "
                 "then reset"
             )
+            self._latch(Trip("cable forces", check.names[worst], words, latches=True))
+        deviation = shown - force
+        low = deviation if self._deviation is None else self._deviation
+        low = low + (1.0 - math.exp(min(0.0, self._seen - now) / _LOW_PASS)) * (deviation - low)
+        self._deviation, self._seen = low, now
+        if check.size(place, low) > MOST:
+            name, found = check.words(place, deviation)
+            words = f"{found}; look for it, then reset"
             self._latch(Trip("cable forces", name, words, latches=True))

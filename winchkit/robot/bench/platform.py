@@ -16,8 +16,7 @@ from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.path_time import PathTime
 from winchkit.robot.bench.platform_correction import HeldPlatform
 from winchkit.robot.bench.platform_pose import require_finite
-from winchkit.robot.bench.quick_stop import quick_stop_ramps
-from winchkit.robot.bench.trajectory import PlatformTrajectory
+from winchkit.robot.bench.trajectory import PlatformTrajectory, quick_stop_ramps
 from winchkit.robot.geometry.kinematics import Pose
 
 

@@ -194,12 +194,11 @@ class HeldPlatform(PlatformPose):
         if preload is not None:
             here = self.pose
             force = self._preloaded(here, preload)
-            loops.append(
-                self.corrections.force_loop(
-                    here, force, self._angles()[0], speed, axial_stiffness=axial_stiffness
-                )
+            loop = self.corrections.force_loop(
+                here, force[None], self._angles()[0], speed, axial_stiffness=axial_stiffness
             )
-            self.corrections.require_balance(here, force)
+            self.corrections.require_balance(loop)
+            loops.append(loop)
         if pose is not None:
             require_type(pose, Pose, "pose")
             loops.append(self.corrections.pose_loop(pose, self._bench.tracker, travel))
@@ -248,9 +247,12 @@ class HeldPlatform(PlatformPose):
         loop = next((one for one in self._held if isinstance(one, ForceLoop)), None)
         if loop is None or not self.moving:
             raise MotionError("no preload is held that could be changed; begin with hold")
-        force = self._preloaded(self.pose, preload)
-        self.corrections.require_torque(force, self._angles()[0])
-        loop.aim(force)
+        here, angles = self.pose, self._angles()[0]
+        force = self._preloaded(here, preload)
+        self.corrections.require_torque(force, angles)
+        own = loop.setting
+        check = self.corrections.check(here, force[None], angles, own.stiffness, known=own.known)
+        loop.aim(force, check)
 
     def held(self) -> dict[str, Any]:
         """What is held, or was held last, and how far the platform is from it.
@@ -331,7 +333,12 @@ class HeldPlatform(PlatformPose):
     ) -> list[CableCorrection]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
         loop = self.corrections.force_loop(
-            pose, force, self._angles()[0], speed, axial_stiffness=axial_stiffness, watched=False
+            pose,
+            force[None],
+            self._angles()[0],
+            speed,
+            axial_stiffness=axial_stiffness,
+            watched=False,
         )
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration

@@ -22,6 +22,8 @@ _MOST = 20_000
 """Samples: 400 s at `_STEP`; longer motions have longer steps."""
 _FEWEST = 16
 """Samples: a motion of less than 0.3 s has them in place of a few steps of 20 ms."""
+_LEAST = 0.1
+"""Quick-stop ramp of a cable that hardly moves, as a share of that of the fastest."""
 
 
 @dataclass(frozen=True)
@@ -116,3 +118,23 @@ def motion_at(path: PlatformPath, distance: Array, rate: Array, change: Array) -
     velocity = first * rate[:, None]
     acceleration = second * rate[:, None] ** 2 + first * change[:, None]
     return PlatformMotion(path.pose(distance), velocity, acceleration)
+
+
+def quick_stop_ramps(planned: PlatformTrajectory, arms: Array, deceleration: float) -> Array:
+    """Decelerations of the motors, (n,), rad/s^2, with which all cables stop in the same time.
+
+    ``arms`` (n,): cable per motor angle, without sign, m/rad. ``deceleration``: of the fastest
+    cable, m/s^2. Returns (n,): in proportion to the largest speeds of the cables; of a cable slower
+    than a tenth of the fastest, as if it had this speed.
+
+    Notes
+    -----
+    A quick stop of the drives decelerates each motor by its own 6085h. The speeds of the cables are
+    not in the same proportion everywhere on a path: a cable at the share x of its largest speed
+    rests after the share x of the common time.
+    """
+    rate = np.gradient(planned.motor_angle, planned.time, axis=0)
+    speed = np.abs(rate).max(axis=0) * arms
+    fastest = float(speed.max())
+    share = speed / fastest if fastest > 0.0 else np.ones_like(speed)
+    return np.asarray(deceleration * np.maximum(share, _LEAST) / arms)

@@ -34,14 +34,19 @@ from winchkit.robot.calibration.candidate_effects import CandidateEffect, candid
 from winchkit.robot.calibration.identifiability import (
     Observability,
     observability,
-    outside_bounds,
     refuse_unfit,
+)
+from winchkit.robot.calibration.notes import (
+    home_notes,
+    instrument_notes,
+    warnings_of,
+    worse_rotation,
 )
 from winchkit.robot.calibration.options import Options, ProgressCallback
 from winchkit.robot.calibration.outliers import far_off, gross_errors, left_out_poses, unexplained
 from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
-from winchkit.robot.calibration.selection import FitEnd, first_model, fitted_with_instruments
+from winchkit.robot.calibration.selection import first_model, fitted_with_instruments
 from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.calibration.swivel_axes import axes_text, reversed_axes
 from winchkit.robot.files.poses import MeasuredPoses, copies, of_poses
@@ -50,7 +55,6 @@ from winchkit.robot.identification.bundle_adjustment import Solution, Weights
 from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import declared_instruments
 from winchkit.robot.identification.parameters import (
-    EFFECTS,
     Estimated,
     Parameters,
     own_effects,
@@ -67,15 +71,9 @@ error."""
 _CLEANINGS = 4
 """Fits without the poses that were found wrong before (rule of thumb: one settles it; a second
 where the tracker's numbers change with them)."""
-_NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a
 robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
-_WORSE_ROTATION = 1.5
-"""Ratio of the held-out rotation errors after and before above which a warning is due."""
-_COARSE_RATIO = 5.0
-"""Standard deviation of positions, in that of the exit points' prior, above which a warning is due
-(rule of thumb: a camera may be coarser than a drawing)."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -329,10 +327,10 @@ def calibrate(
         warnings=(
             *left_out_poses(fit.place[wrong], "the fit"),
             *left_out_poses(validation.place[missed], "the held-out error"),
-            *_instrument_notes(declared, chosen),
-            *_home_notes(given, equations, values),
-            *_warnings(equations, solution, weights, observed, after.unfound),
-            *_worse_rotation(errors_before, after),
+            *instrument_notes(declared, chosen),
+            *home_notes(given, equations, values),
+            *warnings_of(equations, solution, weights, observed, after.unfound),
+            *worse_rotation(errors_before, after),
             *unheld,
             *ratios.words,
         ),
@@ -409,125 +407,3 @@ def _estimates(
             bound = {-1: "low", 0: "", 1: "high"}[int(solution.held[i])]
             out[parameter.name] = Estimated(parameter, nominal, value, std, bound)
     return out
-
-
-def _left_out(equations: RobotEquations) -> list[str]:
-    """Effects of the profiles that this model leaves out."""
-    robot = equations.robot
-    tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
-    own = {table.id for table in robot.profile.effect if table.id in EFFECTS}
-    names = {table.id for table in tables} - own
-    if equations.parameters.law is None and any(w.cable.axial_stiffness for w in robot.winches):
-        names.add("cable-elongation-linear (cable.axial_stiffness)")
-    return [f"effects of the profile left out here: {', '.join(sorted(names))}"] if names else []
-
-
-_OF_TRACKER = {
-    "frame": "the tracker's frame",
-    "reflector": "the reflector's offset on the platform",
-    "scale": "the tracker's scale",
-    "mounting": "the axes of the target, or of the IMU, on the platform",
-    "cell_gain": "the gains of the load cells",
-    "length_scale": "the scales of the length counters",
-}
-
-
-def _instrument_notes(declared: RobotEquations, chosen: FitEnd) -> list[str]:
-    """Numbers of instruments that were fitted, and the datum, in words."""
-    before = declared.instruments.free if declared.instruments else frozenset()
-    out = []
-    if found := [text for name, text in _OF_TRACKER.items() if name in chosen.free - before]:
-        out.append(
-            f"the poses require {' and '.join(found)} to be other than the robot's file has: "
-            "fitted beside the geometry. Declare it as unknown in [instrument]"
-        )
-    if "frame" in chosen.free:
-        own = chosen.equations.robot.profile.instrument.tracker.datum
-        kept = {
-            "robot": "the robot's base frame, by the home pose and the priors of the exit points",
-            "tracker": "the tracker's frame; exit points and home pose are written in it",
-        }
-        out.append(f"datum: {kept[own]}")
-    if "reflector" in chosen.free:
-        out.append(
-            "datum of the platform: its anchor points at the home pose; a common shift of all "
-            "anchor points and of the home pose is the same as another reflector offset"
-        )
-    if "cell_gain" in chosen.free:
-        out.append(
-            "datum of the forces: the platform's mass; a common gain of all cells is the same as "
-            "another mass"
-        )
-    if "mounting" in chosen.free and "position" not in chosen.equations.kinds:
-        out.append(
-            "a bias of roll and pitch is the same as the IMU's mounting: reported as the mounting"
-        )
-    return out
-
-
-def _home_notes(given: RobotEquations, fitted: RobotEquations, values: Array) -> list[str]:
-    """Cable lengths at home that were fitted although no effect asks for them."""
-    index = fitted.parameters.block.get("home_length")
-    if index is None or "home_length" in given.parameters.block:
-        return []
-    return [
-        "the poses require other cable lengths at home than [home] gives, by up to "
-        f"{float(np.max(np.abs(values[index]))) * 1e3:.3g} mm: fitted beside the geometry. Measure "
-        "the home pose anew, or declare the effect home-length"
-    ]
-
-
-def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
-    first, last = rms(before.angle), rms(after.angle)
-    if not last > _WORSE_ROTATION * first:
-        return []
-    return [
-        f"the held-out rotation error grew from {np.degrees(first):.3g} to {np.degrees(last):.3g} "
-        "deg: the fit traded rotations for positions; check the tracker's frame"
-    ]
-
-
-def _disagreements(equations: RobotEquations, weights: Weights) -> list[str]:
-    """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
-    exits = equations.parameters.std[equations.parameters.block["exit_point"]]
-    prior_std, sigma = float(exits.max()), weights.sigma
-    checks = {
-        "closure": "gearbox.direction, the lines' order, [home] and the motor angles there",
-        "position": "that the poses are of this robot, in its base frame",
-    }
-    # A camera may well be coarser than a drawing.
-    most = {"closure": prior_std, "position": _COARSE_RATIO * prior_std}
-    return [
-        f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
-        f"standard deviation of the exit points' prior: check {cause}"
-        for kind, cause in checks.items()
-        if sigma.get(kind, 0.0) > most[kind]
-    ]
-
-
-def _warnings(
-    equations: RobotEquations,
-    solution: Solution,
-    weights: Weights,
-    observed: Observability,
-    unfound: int,
-) -> tuple[str, ...]:
-    out = [*equations.measured.notes, *_left_out(equations)]
-    out += outside_bounds(equations.parameters)
-    if unfound:
-        out.append(
-            f"{unfound} held-out poses were not found from their motor angles: a tension is "
-            "missing that an effect needs, or the cables contradict each other"
-        )
-    out += _disagreements(equations, weights)
-    if not solution.converged:
-        out.append(f"the fit did not converge within {solution.steps} steps")
-    held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]
-    if held:
-        out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
-    if observed.weak:
-        out.append(
-            f"{observed.weak} of {observed.free} parameter combinations rest on the assumed "
-            "values; more poses would settle them"
-        )
-    return tuple(out)

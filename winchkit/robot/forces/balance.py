@@ -86,10 +86,10 @@ def hanging_residual(
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     weight = gravity_wrench(platform, pose.rotation) + inertial
-    return _scale(geometry) * wrench_residual(structure, tension, weight)
+    return wrench_scale(geometry) * wrench_residual(structure, tension, weight)
 
 
-def _scale(geometry: Geometry) -> Array:
+def wrench_scale(geometry: Geometry) -> Array:
     """Diagonal of S, (6,)."""
     lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
     return np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
@@ -109,7 +109,7 @@ def hanging_balance(
     rest. Returns: ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point``
     and ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
     """
-    scale = _scale(geometry)
+    scale = wrench_scale(geometry)
 
     def pulls(own: Geometry, at: Pose) -> Array:
         """Wrench of each cable's force, (p, 6, n)."""

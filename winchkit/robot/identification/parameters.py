@@ -18,7 +18,13 @@ from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.instruments import LARGEST_SCALE, InstrumentValues
-from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
+from winchkit.schema.profiles.robot import (
+    CENTRE_STD,
+    PRIORS,
+    PriorName,
+    PriorSpec,
+    RobotProfile,
+)
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 from winchkit.units import dimension_of, parse
 
@@ -123,9 +129,6 @@ that is in no drawing (rule of thumb)."""
 _ALONG = 1e-3
 """Share of an axis of the platform that lies along a guide's axis from which on it is held
 (numerical: axes are parallel up to rounding)."""
-_CENTRE = 20e-3
-"""Standard deviation of the prior, m: a centre of mass is known from a drawing to some centimetres
-(rule of thumb; the data decide where it can be identified)."""
 _TRACKER_STD = {"m": 1.0, "rad": 1.0, "1": 0.01}
 """Standard deviations of the priors of a tracker's numbers about their registration, by unit: far
 above what the registration leaves, so that the data decide."""
@@ -390,7 +393,7 @@ def _payload(build: _Builder, effects: Sequence[str]) -> None:
     build.add(
         "payload_mass", [IdentifiedParameter("payload-mass.mass", "kg", platform.mass, std, 0.0)]
     )
-    std = _CENTRE * ("payload-centre" in effects)
+    std = CENTRE_STD * ("payload-centre" in effects)
     found = [
         IdentifiedParameter(f"payload-centre.{axis}", "m", value, std)
         for axis, value in zip("xyz", platform.center_of_mass, strict=True)

@@ -41,6 +41,9 @@ PRIORS: dict[PriorName, float] = {
 """Standard deviations of priors that a file does not declare, m: half the width of the bounds of
 CABTIVE paper, Table 4, is read as two standard deviations. That of the cable lengths at home
 (effect ``home-length``) is what remains where the platform is set into a fixture by hand."""
+CENTRE_STD = 20e-3
+"""The same of a centre of mass, m: it is known from a drawing to some centimetres (rule of thumb;
+the data decide where it can be identified)."""
 
 
 @dataclass(frozen=True)
