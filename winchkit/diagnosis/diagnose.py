@@ -256,11 +256,24 @@ def diagnose_prepared(
     known: list[SelectionResult] = []
     try:
         engine, result = search(engine, catalogue, progress, known.append)
-        return _answer(engine, result, file)
+        return _answer(engine, _unless_at_noise(engine, result), file)
     except KeyboardInterrupt:
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
+
+
+def _unless_at_noise(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
+    """The result, without additions where the profile leaves no error above the noise.
+
+    An effect may seem to be there in the frequencies at which repeats agree by chance.
+    """
+    before = (result.initial_model, result.initial_noise)
+    outputs = output_fits(engine, before, before)
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    if excess({name: o.heldout_rms_after for name, o in outputs.items()}, noise) > 0.0:
+        return result
+    return replace(result, final=before[0], noise=before[1])
 
 
 def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -197,7 +198,10 @@ def test_a_cell_that_jumps_by_more_than_is_explained_trips_and_moves_no_cable_fa
     trip = cables.trips[0]
     assert trip.latches
     assert trip.winch == str(index + 1)
-    assert f"cable {index + 1} that is wrong by {sign * jump:+.0f} N" in trip.message
+    named = re.search(rf"cable {index + 1} that is wrong by ([-+]\d+) N", trip.message)
+    assert named is not None
+    # Until then the loop has changed the force of the cable a little.
+    assert float(named[1]) == pytest.approx(sign * jump, rel=0.02)
     assert np.abs(cables.correction.at(0, cables.time, cables.time)[0]) < 0.01
 
 
