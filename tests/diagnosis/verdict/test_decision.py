@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel, without
+from winchkit.diagnosis.diagnose import _unless_at_noise as unless_at_noise
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis, OutputFit
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.decision import verdict_of as decided
 from winchkit.effects.term import Term
 from winchkit.report.text import report_text
@@ -243,3 +245,14 @@ def test_a_random_torque_does_not_follow_the_motion() -> None:
     assert "The motor torque does not follow the motion. Repeats of the same motion differ" in text
     assert "record the same motion again" not in text
     assert "Check the instrument of the motor torque" in text
+
+
+def test_an_addition_where_the_profile_leaves_no_error_above_the_noise_is_no_finding() -> None:
+    answer = diagnose(runs((DRAG,)), GROOVED)
+    assert isinstance(answer.engine, TimeSeriesSelection)
+    found = answer.result
+    assert unless_at_noise(answer.engine, found) is found
+    noise = replace(found.noise, rms={name: 2.0 * own for name, own in found.noise.rms.items()})
+    known = replace(found, initial_model=found.final, initial_noise=noise)
+    other = replace(known, final=found.initial_model)
+    assert unless_at_noise(answer.engine, other).final is found.final
