@@ -89,14 +89,8 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "rest imitated": {"selection.stepwise._imitates_rest": _no},
     "other grid point": {"selection.stepwise.other_grid_point": _no},
     "explained by initial states": {"selection.engine.explained_by_initial_states": _no},
-    "minor orders": {
-        "selection.engine.significant_orders": lambda _, fitted, *__: fitted.hypothesis
-    },
     "truncated series": {"selection.engine.truncated_series": lambda effect: (effect,)},
     "shape at its bound": {"selection.engine.shape_at_bound": _no},
-    "start without discretisation": {
-        "selection.engine.SelectionEngine._without_discretization": lambda *_: []
-    },
     "discretisation in the lack of fit": {
         "selection.time_series.without_discretization_error": lambda _, fitted, __: fitted.residual
     },

@@ -264,10 +264,12 @@ def diagnose_prepared(
 
 
 def _unless_at_noise(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
-    """The result, without additions where the profile leaves no error above the noise.
+    """The result, without additions where the profile leaves no error above the noise of repeats.
 
     An effect may seem to be there in the frequencies at which repeats agree by chance.
     """
+    if not result.noise.from_repeats:
+        return result
     before = (result.initial_model, result.initial_noise)
     outputs = output_fits(engine, before, before)
     noise = {name: output.noise_rms for name, output in outputs.items()}

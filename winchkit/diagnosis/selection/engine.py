@@ -23,7 +23,6 @@ from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.admissible import admissible, best_of_each
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
-from winchkit.diagnosis.selection.minor_orders import significant_orders
 from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
 from winchkit.diagnosis.selection.scores import Projected, Score, score
 from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
@@ -59,8 +58,6 @@ _TOLERANCE = 1e-6
 than 0.02; computing cost: far below the lack of fit."""
 _KEPT_REFITS = 4
 """Fits of models without one of their effects, which elimination and exchange have in common."""
-_WHOLE_CORRECTION = 1.0
-"""In units of the theoretical correction: a larger one is not a discretisation error."""
 
 
 @dataclass(frozen=True)
@@ -395,35 +392,14 @@ class SelectionEngine(ABC):
         for index in reversed(same):
             hypothesis = hypothesis.without(index)
         hypothesis = hypothesis.with_term(series, self.regression.n_runs)
-        fitted = self.without_minor_orders(self.refit(hypothesis, noise), noise)
+        fitted = self.refit(hypothesis, noise)
         longer = FittedCandidate(fitted, self.criterion(fitted))
         return min(trial, longer, key=lambda one: one.criterion)
 
     def _starts(self, hypothesis: Hypothesis, item: Score) -> list[Hypothesis]:
         """Starting values of a hypothesis with a candidate added."""
         terms = [Term(item.candidate.effect, values) for values in starting_values(item)]
-        starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
-        return starts + [one for start in starts for one in self._without_discretization(start)]
-
-    def without_minor_orders(self, fitted: Fit, noise: BandNoise) -> Fit:
-        """A fit without the orders of its series that decrease χ² by less than their penalty."""
-        kept = significant_orders(self.regression, fitted, noise, self.penalty_per_parameter)
-        return fitted if kept is fitted.hypothesis else self.refit(kept, noise)
-
-    def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
-        """The same start with a zero discretisation correction, where hysteresis is added.
-
-        Before the hysteresis was in the model, a large correction explained a part of it; a fit
-        started there ends in a local minimum with its reversals too late.
-        """
-        exceeds_correction = (
-            self.regression.fits_discretization
-            and bool(start.nuisances)
-            and abs(start.nuisances[-1]) > _WHOLE_CORRECTION
-        )
-        if not exceeds_correction or not start.terms[-1].effect.memory:
-            return []
-        return [replace(start, nuisances=(*start.nuisances[:-1], 0.0))]
+        return [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
 
     def _criterion_of_trial(
         self, fitted: Fit, without: Hypothesis, present: Fit, noise: BandNoise

@@ -314,7 +314,6 @@ def _exchange_and_eliminate(
         present = _exchanged_terms(engine, _backward_elimination(engine, present, noise), noise)
         present = pair_exchange(engine, present, noise, 2)
         present = _backward_elimination(engine, present, noise)
-        present = engine.without_minor_orders(present, noise)
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
     return engine.fit_with_noise(present.hypothesis, noise)
