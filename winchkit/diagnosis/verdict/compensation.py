@@ -59,7 +59,8 @@ class CurveInstead:
         if over - by_additions <= CERTAIN * over:
             return False
         price = self._engine.penalty_per_parameter
-        best = ranked_curves(regression, partial, regression.outputs, price)[0].net_gain
+        ranked = ranked_curves(regression, partial, regression.outputs, price)
+        best = max((curve.net_gain for curve in ranked), default=0.0)
         self._imitated = best >= max((1 - CERTAIN) * over, (1 + MARGIN) * by_additions)
         return self._imitated
 
