@@ -86,6 +86,7 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "pairs": {"selection.stepwise._best_pair": _nothing},
     "exchange for a pair": {"selection.stepwise.pair_exchange": _second},
     "exchange": {"selection.stepwise._exchanged_terms": _second},
+    "minor terms": {"selection.stepwise._without_minor_terms": lambda _, p, noise: (p, noise)},
     "rest imitated": {"selection.stepwise._imitates_rest": _no},
     "other grid point": {"selection.stepwise.other_grid_point": _no},
     "explained by initial states": {"selection.engine.explained_by_initial_states": _no},

@@ -4,7 +4,7 @@ A prediction is of the torque of a given motion; a simulator needs values with w
 torque makes the measured motion. Each run is cut into pieces whose initial angle and speed are
 unknowns, and a piece has to end where the next one begins: a start that is off diverges within one
 piece only. The first state of a run is measured, with its noise. Runs of effects with memory, whose
-states nobody measured, are one piece.
+states no instrument reads, are one piece.
 
 References
 ----------

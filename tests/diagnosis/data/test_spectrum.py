@@ -81,15 +81,15 @@ def test_bands_of_noise_are_in_order_and_hold_enough(count: int, copies: int) ->
 
 
 def test_a_fast_length_is_the_largest_with_small_factors_only() -> None:
-    """Against a sieve, to 50 000; at most 1.4 % of a run is left out, less than 0.1 % of most."""
+    """Against a sieve, to 50 000; at most 1.3 % of a run is left out, less than 0.1 % of most."""
     counts = np.arange(1, 50_001)
     rest = counts.copy()
     for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23):
         while np.any(divisible := rest % prime == 0):
             rest[divisible] //= prime
     largest = np.maximum.accumulate(np.where(rest == 1, counts, 0))
-    expected = np.where(counts < 500, counts, largest)
+    expected = np.where(counts < 1000, counts, largest)
     assert np.array_equal([fast_count(int(count)) for count in counts], expected)
     left_out = (counts - expected) / counts
-    assert np.max(left_out) < 0.014
+    assert np.max(left_out) < 0.013
     assert np.median(left_out[4000:]) < 0.001

@@ -44,7 +44,7 @@ def test_ratio_and_gain_are_found_with_their_lines(folder: Path) -> None:
     found = calibrated(folder, "wrong.csv")
     assert found["ratios"]["named"] == ["3"]
     told = [text for text in found["warnings"] if "the cable per motor turn differs" in text]
-    assert [text.partition(" by -")[0] for text in told] == [
+    assert [text.partition(" by −")[0] for text in told] == [
         "line 3: the cable per motor turn differs"
     ]
     (line,) = (each for each in found["ratios"]["lines"] if each["named"])

@@ -229,7 +229,7 @@ def test_one_lines_home_length_is_taken_out_of_the_table_of_all(tmp_path: Path) 
     assert dict(read_robot(one).effect[0].values["length"]) == {"1": "1 mm"}
     assert call("remove", "home-length", "--winch", "1", "-p", one, "-o", none).exit_code == 0
     assert read_robot(none).effect == ()
-    result = call("remove", "home-length/3", "-p", profile, "-o", none)
+    result = call("remove", "home-length/3", "-p", profile, "-o", tmp_path / "x.toml")
     assert result.exit_code == 3
     assert "home-length/1, home-length/2" in result.output
 

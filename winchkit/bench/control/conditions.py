@@ -31,6 +31,8 @@ _SPEED_TOLERANCE = 1.2
 """Overshoot of a velocity loop with the usual damping is below 20 % of its step."""
 _REST_TIME = 0.1
 """A brake that closes lets the motor settle for less, s."""
+_CREPT = 0.02
+"""m: as of a motion that is missing; a brake that settles moves far less."""
 _DEVIATION = 0.25
 """Share of ``limits.speed``: well above the lag of a velocity loop at the limit's acceleration."""
 _DEVIATION_TIME = 0.25
@@ -274,7 +276,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "creep at rest",
         "cable moved by the motor since the winch was disabled, in steps below 2 mm",
         "20 mm",
-        Exceeds("missing", lambda _own: 0.0),
+        Exceeds("crept", lambda _own: _CREPT),
         lambda item, *_: (
             f"the motor has turned by {item.way[1]:.3f} m of cable since rest was commanded (limit "
             "0.020 m): the brake slips, or somebody turns it; secure the load, then reset"

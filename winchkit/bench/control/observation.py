@@ -164,6 +164,8 @@ class Quantities(NamedTuple):
     """Absolute following error, m."""
     missing: float = 0.0
     """Excess of the commanded cable over the moved one beyond what a drive may be late, m."""
+    crept: float = 0.0
+    """Cable moved by the motor since the motion or rest began, either way, m."""
     paid_out: float = 0.0
     """Cable length, m."""
     wound_in: float = 0.0
@@ -310,6 +312,7 @@ class SupervisorMemory:
             abs(asked - moved)
             - max(_MISSING, abs(asked) / 2)
             - self.own.limits.response_time * abs(commanded),
+            abs(moved),
             length,
             -length,
             abs(self.slip) - (_SLIP + _SLIP_SHARE * self.moved),

@@ -113,7 +113,7 @@ def command(
     cls=ManyValues,
     examples=(
         "winchkit remove cable-elongation-linear -p better.toml -o without.toml",
-        "winchkit remove motor-viscous --fit demo-*.csv -p both.toml -o better.toml",
+        "winchkit remove motor-viscous --fit demo-*.csv -p both.toml -o one.toml",
     ),
 )
 @click.argument("effect", shell_complete=complete_effect_of_profile)

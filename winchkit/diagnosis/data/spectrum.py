@@ -35,9 +35,9 @@ _LEAST_COEFFICIENTS = 8
 _LARGEST_FACTOR = 23
 """Largest prime factor of the number of samples of a fast transform; computing cost, measured: up
 to 23 at most twice the time of powers of two."""
-_LEAST_CUT = 500
+_LEAST_CUT = 1000
 """Samples of a run from which it is cut to such a number; computing cost: below it a slow transform
-takes less than 25 µs."""
+takes less than 60 µs."""
 WHOLE_TRANSITION = 3.0
 """In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 
@@ -154,8 +154,8 @@ def fast_count(count: int) -> int:
     """Largest number of samples, at most ``count``, whose transform is fast.
 
     A transform of n samples takes a time in proportion to the prime factors of n: one of 8998 =
-    2·11·409 samples takes ten times as long as one of 8993 = 17·23². At most 1.4 % of a run is left
-    out at its end, the largest gap between such numbers above 500 (650 to 660); shorter runs are
+    2·11·409 samples takes ten times as long as one of 8993 = 17·23². At most 1.3 % of a run is left
+    out at its end, the largest gap between such numbers above 1000 (1105 to 1120); shorter runs are
     kept whole.
     """
     if count < _LEAST_CUT:

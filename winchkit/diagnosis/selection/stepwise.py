@@ -13,7 +13,7 @@ Miller, A. (2002). Subset Selection in Regression, 2nd ed. Chapman & Hall.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import dropwhile
 
@@ -109,7 +109,8 @@ def stepwise_selection(
     start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
     known(start)
     initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
-    final, noise, tried = _forward_selection(engine, *initial, scores, threshold)
+    larger, noise, tried = _forward_selection(engine, *initial, scores, threshold)
+    final, noise = _without_minor_terms(engine, larger, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or lacking
@@ -349,6 +350,36 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same at another minimum."""
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
+
+
+def _without_minor_terms(
+    engine: SelectionEngine, present: Fit, noise: BandNoise
+) -> tuple[Fit, BandNoise]:
+    """Model without additions that explain less than what all of them leave, with repeats.
+
+    Beside so much that is missing they imitate a part of it. Both are excesses of the held-out
+    mean squares over the noise and over what coarse samples add, in units of the noise.
+    """
+    if not noise.from_repeats or len(present.hypothesis.terms) == engine.n_initial_terms:
+        return present, noise
+    folds = engine.folds(present, noise)
+
+    def beyond(fitted: Fit, sampled: Mapping[str, float]) -> float:
+        errors = held_out_rms(engine.regression, fitted, noise, folds)
+        own = {name: max(0.0, rms**2 - sampled[name]) ** 0.5 for name, rms in errors.items()}
+        return excess(own, noise.rms)
+
+    if not beyond(present, dict.fromkeys(noise.rms, 0.0)):
+        return present, noise
+    sampled = engine.discretization_power(present, noise)
+    left, reduced = beyond(present, sampled), present
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        if beyond(without, sampled) - left < left:
+            reduced = engine.refit(reduced.hypothesis.without(index), noise)
+    return (
+        (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
+    )
 
 
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit:

@@ -45,7 +45,7 @@ class CurveInstead:
 
     def __init__(self, engine: TimeSeriesSelection, initial: Fit) -> None:
         self._engine, self._initial = engine, initial
-        self._imitated = False
+        self._imitating: Fit | None = None
 
     def __call__(self, present: Fit, noise: BandNoise) -> bool:
         """Whether the additions of ``present`` imitate a curve; asked after each of them."""
@@ -61,14 +61,16 @@ class CurveInstead:
         price = self._engine.penalty_per_parameter
         ranked = ranked_curves(regression, partial, regression.outputs, price)
         best = max((curve.net_gain for curve in ranked), default=0.0)
-        self._imitated = best >= max((1 - CERTAIN) * over, (1 + MARGIN) * by_additions)
-        return self._imitated
+        if best < max((1 - CERTAIN) * over, (1 + MARGIN) * by_additions):
+            return False
+        self._imitating = present
+        return True
 
     def closest(self, found: SelectionResult) -> SelectionResult:
         """The result with the one addition that explains most, where they imitate a curve."""
-        if not self._imitated:
+        if self._imitating is None:
             return found
-        engine, noise, terms = self._engine, found.noise, found.final.hypothesis.terms
+        engine, noise, terms = self._engine, found.noise, self._imitating.hypothesis.terms
         initial, runs = self._initial.hypothesis, engine.regression.n_runs
         alone = [
             engine.refit(initial.with_term(term, runs), noise)
