@@ -115,6 +115,10 @@ class FittedWinchAddition(FittedAddition):
         The profile's effects, refitted.
     final : Fit
         The same with the new effect.
+    engine : TimeSeriesSelection
+        By which both were fitted.
+    noise : BandNoise
+        Of the final fit.
     """
 
     regression: TimeSeriesRegression

@@ -36,6 +36,7 @@ from winchkit.effects.term import Term
 from winchkit.errors import UsageError
 from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.schema.profiles.winch import WinchProfile
 
 _PIECES = 10
@@ -49,8 +50,6 @@ _MOST = 20
 """Steps of the fit; computing cost: each simulates every run once for each value."""
 _TOLERANCE = 1e-6
 """Relative error of a step of the integration, far below that of the model."""
-_THIRD_DIFFERENCE = 0.6745 * 20**0.5
-"""Median absolute third difference of white noise of unit variance."""
 _EXACT = 1e-12
 """SI: noise of a state that is given without any, so that it has a weight."""
 _SETTLED = 0.1
@@ -163,9 +162,7 @@ def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) 
         count = 1 if law.states else _PIECES
         ends = np.linspace(0, len(whole.time) - 1, count + 1).round().astype(int)
         angle = own["motor_angle"]
-        # Third differences of a motion are far below the noise of an angle.
-        angle_noise = float(np.median(np.abs(np.diff(angle, 3)))) / _THIRD_DIFFERENCE
-        noise = (max(angle_noise, _EXACT), max(float(rate_noise), _EXACT))
+        noise = (max(local_noise(angle), _EXACT), max(rate_noise, _EXACT))
         for begin, end in pairwise(ends.tolist()):
             there = slice(begin, end + 1)
             signals = {name: values[there] for name, values in whole.inputs.signals.items()}

@@ -279,7 +279,7 @@ CONDITIONS: tuple[Condition, ...] = (
         Exceeds("crept", lambda _own: _CREPT),
         lambda item, *_: (
             f"the motor has turned by {item.way[1]:.3f} m of cable since rest was commanded (limit "
-            "0.020 m): the brake slips, or somebody turns it; secure the load, then reset"
+            f"{_CREPT:.3f} m): the brake slips, or somebody turns it; secure the load, then reset"
         ),
         latches=True,
         when="disabled",
