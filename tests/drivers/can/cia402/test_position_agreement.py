@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from counter_agreement import (
+    ACCELERATION,
     CYCLE,
     FILTERS,
     RADIUS,
@@ -86,3 +87,25 @@ def test_a_homing_and_a_reset_begin_anew() -> None:
     assert str(compare.found).startswith("6064h changed by 1.592 turns of the motor within")
     compare.forget()
     assert not any(compare.take(k * CYCLE, 60.0, 0.0) for k in range(400, 500))
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    span=st.floats(0.02, 0.2),
+    begun=st.floats(0.3, 1.0),
+    turned=st.just(1.0) | st.floats(-1.0, 0.5),
+)
+def test_a_gap_in_the_feedback_hides_no_wrong_counter(
+    span: float, begun: float, turned: float
+) -> None:
+    """A jog speeds up from 0.4 s on, and stands again at 1.2 s; nothing is heard for a while."""
+    compare = agreement_of(DRIVES["generic-cia402"])
+    angle, speed, found = 0.0, 0.0, False
+    for k in range(300):
+        now = k * CYCLE
+        ramp = min(now - 0.4, 1.2 - now) * ACCELERATION
+        speed = min(max(ramp, 0.0), SPEED) / RADIUS
+        angle += (1.0 if now < 0.4 else turned) * speed * CYCLE
+        if not begun < now < begun + span:
+            found = compare.take(now, angle, speed)
+    assert found == (turned != 1.0)

@@ -13,7 +13,8 @@ whose way within the short one is too short. The tolerance is that of the measur
   its first change a hundredth of the greatest speed;
 - the response time times the range of the speeds in the window: a filter of first order with a
   time constant T makes the integral late by exactly T times the change of its output;
-- what an acceleration within the response time turns before a late 606Ch shows any of it.
+- what an acceleration within the response time turns before a late 606Ch shows any of it;
+- what may have been turned otherwise within a gap without feedback.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ _STEPS = 2
 """Counts of 6064h by which the ends of a window are rounded."""
 _COARSEST = 0.01
 """Share of the greatest speed: no drive that follows a speed measures it more coarsely."""
-_GAP = 0.12
-"""After so long without feedback the comparison begins anew, s: longer than the longest cycle, and
-than the age at which feedback is stale at the usual heartbeat."""
+_GAP = 0.05
+"""Longer than a cycle, s: within it the speed may have gone straight from one value to the other,
+or up and down by the acceleration."""
 _new = tuple.__new__
 
 
@@ -64,8 +65,8 @@ class _WindowPoint(NamedTuple):
     """By 6064h."""
     integral: float
     """Of 606Ch."""
-    way: float
-    """Integral of its size."""
+    slack: float
+    """Sum of what the integral may be wrong by."""
     velocity: float
 
 
@@ -96,7 +97,7 @@ class _Window:
 
     def take(self, point: _WindowPoint, tolerance: _Tolerance) -> bool:
         """Take a point; whether the two have been apart for longer than one can be late."""
-        time, angle, integral, way, _ = point
+        time, angle, integral, slack, _ = point
         if time < self._next:
             return False
         self._next = time + self._every
@@ -105,9 +106,9 @@ class _Window:
         oldest = time - self._span
         while points[0][0] < oldest:
             points.popleft()
-        begun, angle_then, integral_then, way_then, _ = points[0]
+        begun, angle_then, integral_then, slack_then, _ = points[0]
         excess = abs((angle - angle_then) - (integral - integral_then)) - (
-            tolerance.constant + tolerance.step * (time - begun) + _SHARE * (way - way_then)
+            tolerance.constant + tolerance.step * (time - begun) + slack - slack_then
         )
         if excess > 0:
             speeds = [one.velocity for one in points]
@@ -126,7 +127,8 @@ class PositionAgreement:
     """The comparison for one drive; SI at the motor shaft."""
 
     __slots__ = (
-        "_active", "_finest", "_last", "_long", "_short", "_smallest", "_tolerance", "found",
+        "_active", "_finest", "_last", "_long", "_quarter", "_short", "_smallest", "_tolerance",
+        "found",
     )  # fmt: skip
 
     def __init__(
@@ -144,6 +146,8 @@ class PositionAgreement:
         step = max(velocity_step, _COARSEST * fastest)
         self._tolerance = _Tolerance(_STEPS * angle_step + late, step, response)
         self._finest, self._smallest = velocity_step, inf
+        self._quarter = late / (2 * response**2) if response > 0 else 0.0
+        """Of the acceleration, rad/s^2: a v-t triangle of length t has the area a t^2 / 4."""
         self._active = response > 0
         self.found: Disagreement | None = None
         """The first disagreement since the last :meth:`forget`."""
@@ -175,16 +179,17 @@ class PositionAgreement:
         """
         if not self._active:
             return False
-        then, _, integral, way, before = self._last
+        then, _, integral, slack, before = self._last
         span = time - then
         turned = (velocity + before) / 2 * span
-        if not 0 <= span <= _GAP or not isfinite(turned):
+        if span < 0 or not isfinite(turned):
             self.restart()
             self._last = _WindowPoint(time, angle, 0.0, 0.0, velocity)
             return self.found is not None
-        self._last = point = _new(
-            _WindowPoint, (time, angle, integral + turned, way + abs(turned), velocity)
-        )
+        slack += _SHARE * abs(turned)
+        if span > _GAP:
+            slack += (abs(velocity - before) / 2 + self._quarter * span) * span
+        self._last = point = _new(_WindowPoint, (time, angle, integral + turned, slack, velocity))
         if velocity != before:
             self._learn_step(abs(velocity - before))
         for window in (self._short, self._long):
