@@ -256,10 +256,11 @@ class Bench(BenchConnection):
         """
         self.loop.require_other_thread("reset")
         by = self.commanders.actor.name
+        ended = [f"winch {name}: a motion under way" for name in self.winch if self.winch[name].moving]
         for winch in self.winch.values():
             winch.end_held(f"{by} reset the bench; give a new command")
         try:
-            cleared = reset(self._wired, self.spec, self.clock)
+            cleared = ended + reset(self._wired, self.spec, self.clock)
         finally:
             # A bus that was opened again has a new receive thread.
             self.realtime.cover(self._urgent_threads(), self._wired.companions)
