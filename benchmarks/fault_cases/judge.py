@@ -239,6 +239,9 @@ def _tripped_at(record: Record, name: str, reference: tuple[float, float] | None
 
 def _judge_rest(record: Record, reference: tuple[float, float] | None) -> str:
     end = record.released if record.case.motion == "jog" else record.reset
+    if not math.isfinite(record.tripped_at):
+        # What only forbade a motion at rest forbids none once it is mended.
+        end = min(end, record.mended)
     for name, samples in record.truth.items():
         start = _tripped_at(record, name, reference)
         if start is None:
