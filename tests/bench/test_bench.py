@@ -306,7 +306,7 @@ def test_a_stop_from_another_thread_ends_a_timed_jog(bench: Bench) -> None:
     stopper = threading.Timer(0.4, bench.stop)
     stopper.start()
     begin = time.monotonic()
-    with pytest.raises(MotionError, match=r"was stopped by .* before the move was finished"):
+    with pytest.raises(MotionError, match=r"was stopped by .* before its motion was finished"):
         bench.winch["A"].jog(pay_out=0.1, duration=30.0)
     assert time.monotonic() - begin < 10
     stopper.join()

@@ -115,7 +115,7 @@ def test_a_stop_of_one_stops_all(bench: Bench) -> None:
     until_moving(bench)
     bench.winch["C"].stop()
     assert bench.snapshot.at_rest
-    with pytest.raises(MotionError, match=r"was stopped by .* before the move was finished"):
+    with pytest.raises(MotionError, match=r"was stopped by .* before its motion was finished"):
         bench.winch["A"].wait()
 
 

@@ -91,7 +91,7 @@ def test_a_quick_stop_ends_a_held_tension(live: LiveBench, bench: Bench) -> None
             bench.stop_now(wait=False)
 
     remove = bench.on_cycle(stop)
-    with pytest.raises(MotionError, match=r"was stopped by .* before the move was finished"):
+    with pytest.raises(MotionError, match=r"was stopped by .* before its motion was finished"):
         winch.hold_tension(wanted, duration=2.0, stiffness=1e3)
     with pytest.raises(MotionError, match="was stopped by"):
         winch.refresh()

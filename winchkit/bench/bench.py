@@ -250,15 +250,15 @@ class Bench(BenchConnection):
     def reset(self) -> list[str]:
         """Clear trips and drive faults; drives that lost their set-up are commissioned again.
 
-        A bus that went down is opened again. Nothing is enabled by any of it, and what was held
-        before is ended by it. Returns what was cleared, in words. Raises LimitTripped naming what
-        still forbids any motion, with the latch as it was, NotPermitted, ConnectionLost.
+        A bus that went down is opened again. Nothing is enabled by any of it, and a motion
+        under way is ended by a ramp. Returns what was cleared, in words. Raises LimitTripped naming
+        what still forbids any motion, with the latch as it was, NotPermitted, ConnectionLost.
         """
         self.loop.require_other_thread("reset")
-        by = self.commanders.actor.name
-        ended = [f"winch {name}: a motion under way" for name in self.winch if self.winch[name].moving]
-        for winch in self.winch.values():
-            winch.end_held(f"{by} reset the bench; give a new command")
+        ended = [
+            f"winch {name}: a motion under way" for name in self.winch if self.winch[name].moving
+        ]
+        self._run_down(self.winch, wait=False)
         try:
             cleared = ended + reset(self._wired, self.spec, self.clock)
         finally:

@@ -98,17 +98,6 @@ class Winch(WinchStatus):
         if self._held is not None and self.commanded_here:
             self._held.dead_man.end("it was released; give a new command")
 
-    def end_held(self, why: str) -> None:
-        """End what is held by a ramp, whoever holds it.
-
-        Parameters
-        ----------
-        why : str
-            What its client gets as the error of the next refresh.
-        """
-        if self._held is not None:
-            self._held.dead_man.end(why)
-
     @property
     def held(self) -> bool:
         """Whether a jog or a held tension of the acting client is under way."""

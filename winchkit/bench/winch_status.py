@@ -209,5 +209,5 @@ class WinchStatus:
             raise DriveFault(f"winch {self.name} was stopped with {self._controller.reason}")
         if self._controller.stopped:
             who = self.stopped_by or "the control loop"
-            what = f"was stopped by {who} before the move was finished"
+            what = f"was stopped by {who} before its motion was finished"
             raise MotionError(f"winch {self.name} {what}")

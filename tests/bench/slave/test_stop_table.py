@@ -20,7 +20,7 @@ from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.control import stop_escalation
 from winchkit.bench.control.stop_escalation import STOP_TABLE, StopMethod
-from winchkit.errors import WinchkitError
+from winchkit.errors import MotionError, WinchkitError
 
 _RAMP, _LAG = 628.0, 0.03
 _WITHIN = 0.15
@@ -140,3 +140,25 @@ def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> Non
         rig.wait(1.0)
         bench.reset()
         assert not bench.snapshot.tripped
+
+
+@pytest.mark.parametrize("motion", ["move", "jog"])
+def test_a_reset_ends_a_motion_by_a_ramp_and_says_so(tmp_path: Path, motion: str) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        winch = bench.winch["A"]
+        if motion == "jog":
+            jogging(rig, bench)
+        else:
+            winch.move_to(winch.cable_length + 1.0, speed=0.1, wait=False)
+            rig.wait(1.0)
+        begin = rig.time
+        assert bench.reset() == ["winch A: a motion under way"]
+        enabled = [s.time for s in rig.samples[0] if s.state is State.ENABLED]
+        assert max(enabled) - begin < _RAMP_DOWN + 0.1
+        assert not bench.snapshot.tripped
+        rest = winch.cable_length
+        with pytest.raises(MotionError, match="stopped"):
+            winch.wait() if motion == "move" else winch.refresh()
+        rig.wait(0.5)
+        assert winch.cable_length == pytest.approx(rest, abs=1e-4)

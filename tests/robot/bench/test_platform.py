@@ -83,7 +83,7 @@ def test_a_stop_ends_on_the_path_and_all_cables_come_to_rest_together(bench: Ben
     moving = np.abs(velocity).max(axis=1) > 0.2 * fastest
     quick = np.abs(velocity[0]) > 0.3 * fastest
     assert np.ptp(shares[moving][:, quick], axis=1).max() < 0.15, "in the same proportion"
-    with pytest.raises(MotionError, match=r"was stopped by .* before the move was finished"):
+    with pytest.raises(MotionError, match=r"was stopped by .* before its motion was finished"):
         platform.wait()
 
 

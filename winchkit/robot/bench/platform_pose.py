@@ -73,7 +73,7 @@ class PlatformPose:
             raise NotPermitted(
                 f"winch {winch} may not hold its tension{beside}: of the {count} cables of robot "
                 f"'{self.robot.profile.name}' the platform leaves {free} free, the others "
-                "hold it; use tension_trim of [robot] to correct the tensions of all"
+                "hold it; `winchkit hold-platform` holds those of all"
             )
 
     @property
