@@ -28,6 +28,7 @@ _positions = st.builds(
         max_size=40,
     ),
     unit=st.floats(-1.0, 1.0),
+    trim=st.floats(-10.0, 10.0),
 )
 
 

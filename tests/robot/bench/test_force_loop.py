@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +22,10 @@ from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.robot import Robot, robot_of
 from winchkit.robot.bench.balance_check import MOST, BalanceCheck, check_of, sources_of
 from winchkit.robot.bench.correction import Bounds, Correction
+from winchkit.robot.bench.corrections import elongating
 from winchkit.robot.bench.force_loop import ForceLoop, ForceSetting
+from winchkit.robot.bench.platform import Platform
+from winchkit.robot.bench.pose_loop import PoseLoop, TrackerLimits, TrackerWatch
 from winchkit.robot.forces.force_distribution import ForceLimits, null_space, quadratic
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_robot, read_simbench
@@ -91,6 +95,7 @@ class Cables:
             [self.loop],
             lambda elapsed, _now: elapsed < 12.0,
             self.trips.append,
+            np.eye(8),
         )
         for index in range(8):
             self.correction.join(index)
@@ -362,3 +367,67 @@ def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(structure: Array
         assert not bench.snapshot.tripped
         assert before > 50.0
         assert missing() < 0.7 * before
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    forces=st.lists(st.floats(-100.0, 100.0), min_size=2, max_size=2),
+    pose=st.lists(st.floats(-1e-3, 1e-3), min_size=6, max_size=6),
+    spread=st.lists(st.floats(0.5, 1.5), min_size=8, max_size=8),
+)
+def test_cable_wound_for_forces_is_told_from_a_change_of_the_pose(
+    structure: Array, forces: list[float], pose: list[float], spread: list[float]
+) -> None:
+    """Beside a pose loop; alone a force loop changes nothing else, and a pose loop no forces."""
+    stiffness, by_pose = STIFFNESS * np.array(spread), -structure.T
+    cables = Cables(structure, WANTED)
+    force = cables.loop
+    force.setting = replace(force.setting, stiffness=stiffness)
+    tracker = PoseLoop(
+        ROBOT.home, by_pose, lambda: None, TrackerWatch(TrackerLimits(0.1, 0.2, 0.3)), print
+    )
+    elastic = null_space(structure) @ forces / stiffness
+    wound = elastic + by_pose @ pose
+    assert elongating([force, tracker], 8) @ wound == pytest.approx(elastic, abs=1e-12)
+    assert elongating([force], 8) @ wound == pytest.approx(wound)
+    assert not (elongating([tracker], 8) @ wound).any()
+
+
+@pytest.mark.slow
+def test_the_pose_stays_that_of_the_plan_where_cells_correct_along_it(tmp_path: Path) -> None:
+    """Also for a later process, by the record of positions, and until a winch is homed.
+
+    Without that millimetres of elongation turn the pose by the lengths: this robot's cables hold
+    its rotation about z 50 times more softly than its position.
+    """
+    sim = read_simbench(find("sim", "winding-device-robot"))
+    assert sim.bench.robot is not None
+    bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
+    wiring = replace(sim.bench.robot, tension_trim="along", axial_stiffness=200e3)
+    sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
+    clock = SimulatedClock()
+    with LiveBench(sim, seed=2, simulated_time=clock) as live:
+        assert live.robot is not None
+        spec = replace(live.bench_spec, latch_file=str(tmp_path / "bench.trip.json"))
+
+        def off(platform: Platform) -> float:
+            with live.up_to_date():
+                assert live.robot is not None
+                return float(
+                    np.linalg.norm(platform.pose.position[0] - live.robot.platform.position)
+                )
+
+        with open_bench(spec, clock) as bench:
+            clock.sleep(0.5)
+            for x, y in ((-0.05, -0.05), (0.05, -0.05), (0.05, 0.05)):
+                goal = bench.robot.moved({"x": x, "y": y}, relative=False)
+                bench.robot.move(goal, 0.1, 0.2)
+            trims = [one.trim_angle for one in bench.snapshot.winch.values()]
+            assert off(bench.robot) < 1e-3
+        with open_bench(spec, clock) as bench:
+            clock.sleep(0.5)
+            assert [one.trim_angle for one in bench.snapshot.winch.values()] == pytest.approx(trims)
+            assert off(bench.robot) < 1e-3
+            winch = bench.winch["1"]
+            winch.home(at=winch.cable_length)
+            assert bench.snapshot.winch["1"].trim_angle == 0.0 != trims[0]

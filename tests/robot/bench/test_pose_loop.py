@@ -52,6 +52,7 @@ class Held:
             [self.loop],
             lambda _elapsed, _now: True,
             self.trips.append,
+            np.zeros((len(names), len(names))),
         )
         for index in range(len(names)):
             self.correction.join(index)

@@ -459,14 +459,19 @@ class ControlLoop:
         self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
     ) -> BenchSnapshot:
         taken = [
-            (parts.controller.phase, parts.cable.correction, parts.commander)
+            (
+                parts.controller.phase,
+                parts.cable.correction,
+                parts.commander,
+                parts.axis.trim_angle,
+            )
             for parts in self.winches.values()
         ]
         return BenchSnapshot(
             now,
             self._count,
             WinchSnapshots(
-                lambda: pictures(inputs, taken, now), lambda: [phase for phase, _, _ in taken]
+                lambda: pictures(inputs, taken, now), lambda: [phase for phase, *_ in taken]
             ),
             self.supervisor.tripped,
             blocked,

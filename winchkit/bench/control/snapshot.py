@@ -75,6 +75,9 @@ class WinchSnapshot(NamedTuple):
     """Name of its commander; empty where it has none."""
     commanded_speed: float = math.nan
     """Commanded derivative of the cable length (positive pays out), m/s."""
+    trim_angle: float = 0.0
+    """Motor angle, rad, by which corrections of a platform's cable forces have elongated the cable
+    since the winch was homed: of a motion of the platform there is none in it."""
 
     def without_values(self, phase: Phase, state: str) -> WinchSnapshot:
         """The winch once nothing measured is valid any more, e.g. after the loop has failed."""

@@ -232,9 +232,10 @@ def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
     )
 
 
-Captured = tuple[Phase, float, str]
+Captured = tuple[Phase, float, str, float]
 """What a winch is shown by, beside what the supervisor saw of it, as it was in a cycle: phase,
-correction of the cell's reading for the tension at the platform end (N), name of its commander."""
+correction of the cell's reading for the tension at the platform end (N), name of its commander,
+and the motor angle of corrections of its force (rad)."""
 
 
 def pictures(
@@ -248,7 +249,7 @@ def pictures(
 
 
 def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
-    phase, correction, commander = taken
+    phase, correction, commander, trim = taken
     feedback = seen.feedback or _NOTHING
     fresh = {role: _fresh(item, now) for role, item in seen.sensors.items()}
     cell, load = fresh.get("cell", math.nan), fresh.get("load", math.nan)
@@ -273,4 +274,5 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
         length_known=not seen.length_doubt,
         commander=commander,
         commanded_speed=0.0 - seen.commanded,
+        trim_angle=trim,
     )

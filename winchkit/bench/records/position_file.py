@@ -105,6 +105,7 @@ def _record(positions: Mapping[str, KeptPosition], *, ended: bool) -> str:
             "closed": kept.closed,
             "serial": kept.serial,
             "unit": kept.unit,
+            "trim": kept.trim,
             "objects": [[*key, value] for key, value in kept.objects.items()],
         }
         for name, kept in positions.items()
@@ -134,5 +135,6 @@ def _kept(row: Mapping[str, Any]) -> KeptPosition:
         closed=row["closed"] is True,
         serial=int(row["serial"]),
         unit=float(row["unit"]),
+        trim=float(row["trim"]),
         objects={(int(i), int(sub)): int(value) for i, sub, value in row["objects"]},
     )

@@ -63,7 +63,7 @@ def indexed(folder: str | Path) -> Partitions:
         raise FileError(Fault("no such folder of runs", str(folder)))
     tables = Partitions(Path(folder))
     if not tables.files("runs"):
-        raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index {folder}' first")
+        raise FileError(f"{folder}: has no index; run 'winchkit library index {folder}' first")
     return tables
 
 

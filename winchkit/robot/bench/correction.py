@@ -20,6 +20,7 @@ from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Setpoint, fastest_within
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.tension_control import UsedUp
+from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.schema.bench import LimitSpec
 
 Latch = Callable[[Trip], None]
@@ -63,10 +64,12 @@ class Correction:
         loops: Sequence[Loop],
         lasts: Callable[[float, float], bool],
         latch: Latch,
+        elongating: Array,
     ) -> None:
         """Take ``lasts``: whether it goes on, by its duration so far and the true time (s).
 
-        ``latch`` takes the trip of a travel that is used up.
+        ``latch`` takes the trip of a travel that is used up. ``elongating`` (n, n): what of the
+        wound cable changes forces and not the pose.
         """
         count = len(bounds.names)
         self.loops = loops
@@ -75,6 +78,9 @@ class Correction:
         self.measured = np.zeros(count)
         """Cable wound in since the start by the motors, (n,), m."""
         self._bounds, self._lasts, self._latch = bounds, lasts, latch
+        self._elongating = elongating
+        self.elongation = np.zeros(count)
+        """Cable wound in for the forces, (n,), m: the pose stays."""
         self._acceleration = min(one.acceleration for one in bounds.limits)
         self.lag = max(one.response_time for one in bounds.limits) / 2
         """Usual lag of a drive behind its speed, s."""
@@ -121,6 +127,7 @@ class Correction:
         largest, most = float(np.abs(change).max()), self._acceleration * step
         self._speed = before + change * min(1.0, most / largest) if largest > 0 else requested
         self._travelled = self._travelled + (before + self._speed) / 2 * step
+        self.elongation = self._elongating @ self._travelled
         self.ended = self._stopped and not self._speed.any()
 
     def _requested(self, time: float, now: float) -> Array:
@@ -154,26 +161,32 @@ class CableCorrection:
     joins = False
 
     def __init__(
-        self, correction: Correction, index: int, cable: CableMap, *, holds: bool = False
+        self,
+        correction: Correction,
+        index: int,
+        cable: CableMap,
+        axis: Cia402Axis,
+        *,
+        holds: bool = False,
     ) -> None:
         self.holds = holds
         self.correction = correction
-        self._index, self._cable = index, cable
-        self._begin = self._slope = math.nan
+        self._index, self._cable, self._axis = index, cable, axis
+        self._begin = self._slope = self._trimmed = math.nan
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
-        """Begin at rest at a motor angle (rad)."""
+        """Begin at a motor angle (rad), at rest or beside a motion of the platform."""
         self._begin, self._slope = angle, 1.0 / self._cable.at(angle)[1]
-        self.join(time)
-
-    def join(self, time: float) -> None:
-        """Begin, where a motion of the platform has the angle."""
+        self._trimmed = self._axis.trim_angle
         self.correction.join(self._index)
-        self.correction.at(self._index, time, time)
+        self.at(time, time)
 
     def at(self, time: float, now: float) -> tuple[float, float]:
         """Cable wound in since the start (m) and winding speed (m/s)."""
-        return self.correction.at(self._index, time, now)
+        found = self.correction.at(self._index, time, now)
+        elongation = float(self.correction.elongation[self._index])
+        self._axis.trim_angle = self._trimmed + elongation * self._slope
+        return found
 
     def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Where the correction is at this time."""
@@ -193,9 +206,14 @@ class HeldCorrection(CableCorrection):
     """A correction that lasts while its commander refreshes it."""
 
     def __init__(
-        self, correction: Correction, index: int, cable: CableMap, dead_man: DeadMan
+        self,
+        correction: Correction,
+        index: int,
+        cable: CableMap,
+        axis: Cia402Axis,
+        dead_man: DeadMan,
     ) -> None:
-        super().__init__(correction, index, cable)
+        super().__init__(correction, index, cable, axis)
         self.dead_man = dead_man
 
 

@@ -223,7 +223,8 @@ class Corrections:
         """The correction by loops, within the bounds of the winches."""
         limits = [winch.wiring.limits for winch in self.winches]
         bounds = Bounds(self.robot.names, limits, travel, speed)
-        return Correction(bounds, loops, lasts, self.bench.loop.supervisor.latch)
+        latch = self.bench.loop.supervisor.latch
+        return Correction(bounds, loops, lasts, latch, elongating(loops, len(limits)))
 
     def _stiffness(
         self, pose: Pose, force: Array, angles: Array, axial_stiffness: float | None
@@ -260,3 +261,20 @@ class Corrections:
                     f"[robot], needs {torque:.3g} N m at its motor, and the drive gives "
                     f"{most:.3g} N m at most (6072h); lower `tension` of [robot]"
                 )
+
+
+def elongating(loops: Sequence[Loop], count: int) -> Array:
+    """What of the cable that loops wind in changes forces and not the pose, (n, n).
+
+    Of both together: a change of the cables by forces that balance each other, and one that the
+    platform follows, are a basis of all changes.
+    """
+    forces = next((one.setting for one in loops if isinstance(one, ForceLoop)), None)
+    poses = next((one.by_pose for one in loops if isinstance(one, PoseLoop)), None)
+    if forces is None:
+        return np.zeros((count, count))
+    if poses is None:
+        return np.eye(count)
+    elastic = null_space(poses.T) / forces.stiffness[:, None]
+    shares = np.linalg.pinv(np.column_stack([elastic, poses]))
+    return np.asarray(elastic @ shares[: elastic.shape[1]])

@@ -40,11 +40,11 @@ class CableMotion:
         self._cable = cable
         self._end: float | None = None
 
-    def start(self, time: float, _angle: float, _winding_speed: float) -> None:
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at rest at the first angle of the plan."""
         self.clock.at(time)
         if self._along and self.trim is not None:
-            self.trim.join(time)
+            self.trim.start(time, angle, 0.0)
 
     def target(self, time: float, angle: float, now: float) -> Setpoint:
         """Angle and velocity at the present time along the motion, with the correction."""
@@ -61,7 +61,7 @@ class CableMotion:
         if done and trim is not None:
             if not self._trimming and not self.clock.stopped:
                 self._trimming = True
-                trim.join(time)
+                trim.start(time, angle, 0.0)
             done = trim.correction.ended or not self._trimming
         return Setpoint(velocity + GAIN * (planned - angle), planned, velocity * arm, done=done)
 

@@ -111,7 +111,7 @@ class Platform(HeldPlatform):
         trims: list[CableCorrection] | list[None] = [None] * len(self._winches)
         if mode == "along":
             common = self.corrections.along(planned, self._angles()[0], clock)
-            trims = [CableCorrection(common, i, one.cable) for i, one in enumerate(self._winches)]
+            trims = self._cable_corrections(common, hold=hold)
         elif mode == "end":
             trims = self._trims(
                 planned.pose[-1:],

@@ -15,7 +15,7 @@ from winchkit.bench.host import WinchHost
 from winchkit.bench.winch import LONGEST_HOLD
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.plain_json import finite_or_none
-from winchkit.robot.bench.correction import CableCorrection, HeldCorrection
+from winchkit.robot.bench.correction import CableCorrection, Correction, HeldCorrection
 from winchkit.robot.bench.corrections import TRAVEL, Corrections
 from winchkit.robot.bench.force_loop import ForceLoop
 from winchkit.robot.bench.platform_pose import PlatformPose, require_finite
@@ -212,7 +212,7 @@ class HeldPlatform(PlatformPose):
         )
         self._start(
             [
-                HeldCorrection(common, i, winch.cable, dead_man)
+                HeldCorrection(common, i, winch.cable, self._bench.axes[winch.name], dead_man)
                 for i, winch in enumerate(self._winches)
             ]
         )
@@ -343,8 +343,12 @@ class HeldPlatform(PlatformPose):
         common = self.corrections.correction(
             [loop], travel, speed, lambda elapsed, _: elapsed < duration
         )
+        return self._cable_corrections(common, hold=hold)
+
+    def _cable_corrections(self, common: Correction, *, hold: bool) -> list[CableCorrection]:
+        """A correction of all cables, of each winch."""
         return [
-            CableCorrection(common, i, winch.cable, holds=hold)
+            CableCorrection(common, i, winch.cable, self._bench.axes[winch.name], holds=hold)
             for i, winch in enumerate(self._winches)
         ]
 

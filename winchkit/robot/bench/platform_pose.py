@@ -82,7 +82,7 @@ class PlatformPose:
 
         Raises NotPermitted where they fit no pose, or two that the cables can hold.
         """
-        angles = self._angles()
+        angles = self._angles() - self._trims_so_far()
         for start in self._starts(angles):
             pulled = self._forces(start)
             found = self.robot.poses_at(angles, start, pulled, tolerance=np.inf, search=np.inf)
@@ -182,6 +182,11 @@ class PlatformPose:
     def _angles(self) -> Array:
         snapshot = self._bench.snapshot
         return np.array([[snapshot.winch[one.name].motor_angle for one in self._winches]])
+
+    def _trims_so_far(self) -> Array:
+        """Motor angles of corrections of the forces: they elongate cables, the pose stays."""
+        snapshot = self._bench.snapshot
+        return np.array([snapshot.winch[one.name].trim_angle for one in self._winches])
 
     def _forces(self, pose: Pose) -> Array:
         """Cable forces of the plan at a pose at rest, (1, n); zero where there are none."""

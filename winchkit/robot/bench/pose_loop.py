@@ -142,7 +142,9 @@ class PoseLoop:
         self.goal = goal
         self.error = np.full(6, math.nan)
         """Position (m) and rotation vector (rad) of the newest pose from the goal, (6,)."""
-        self._by_pose, self._newest, self._numbers = by_pose, newest, numbers
+        self.by_pose = by_pose
+        """Derivatives of the cable lengths by the pose, (n, 6)."""
+        self._newest, self._numbers = newest, numbers
         self._watch, self._latch = watch, latch
         self._moved = -np.linalg.pinv(by_pose)
         self._seen: TrackedPose | None = None
@@ -156,7 +158,7 @@ class PoseLoop:
 
     def left(self, index: int) -> str:
         """Cable by which the platform is off its pose."""
-        return f"{float(self._by_pose[index] @ self.error) * 1e3:+.2f} mm of cable"
+        return f"{float(self.by_pose[index] @ self.error) * 1e3:+.2f} mm of cable"
 
     def speeds(self, time: float, now: float, wound: Array) -> Array | None:
         """Winding speeds (n,), m/s; None without a pose, or one that trips the bench."""
@@ -174,7 +176,7 @@ class PoseLoop:
             share = 1.0 - math.exp((self._time - time) / LOW_PASS)
             self._low = self._low + share * (self.error - self._low)
         self._time = time
-        return np.asarray(self._by_pose @ self._low / TIME)
+        return np.asarray(self.by_pose @ self._low / TIME)
 
     def deviation(self, told: TrackedPose) -> Array:
         """Position (m) and rotation vector (rad) of a tracker's pose from the goal, (6,)."""

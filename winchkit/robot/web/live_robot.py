@@ -31,10 +31,11 @@ class LiveRobot:
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
         """Pose and cables at a status; None where a motor angle is not known or fits no pose."""
         winches = [status.get("winch", {}).get(name, {}) for name in self._robot.names]
-        angles, tension = (
+        angles, trims, tension = (
             np.array([np.nan if one.get(key) is None else one[key] for one in winches], dtype=float)
-            for key in ("motor_angle", "tension")
+            for key in ("motor_angle", "trim_angle", "tension")
         )
+        angles = angles - trims  # a correction of the forces elongates the cables: the pose stays
         if not np.isfinite(angles).all():
             return None
         forces = tension if np.isfinite(tension).all() else 0.0

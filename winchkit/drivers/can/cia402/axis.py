@@ -255,6 +255,18 @@ class Cia402Axis:
         return position.after_boot_up() if self.mapping_lost else position.doubt
 
     @property
+    def trim_angle(self) -> float:
+        """Angle that corrections of the cable force have turned since the last homing, rad.
+
+        The record of the position has it too.
+        """
+        return self._position.trim
+
+    @trim_angle.setter
+    def trim_angle(self, angle: float) -> None:
+        self._position.trim = angle
+
+    @property
     def position_mark(self) -> tuple[int, int, str, bool]:
         """What of the position's record changes besides the count."""
         return self._position.mark

@@ -53,6 +53,8 @@ class KeptPosition:
     """Volatile objects as the set-up had written them."""
     unit: float = 0.0
     """Of a count, rad; negative where 607Eh reverses it."""
+    trim: float = 0.0
+    """Of it, what corrections of the cable force have turned, rad."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ class MotorPosition:
         self._incremental = servo.encoder == "incremental"
         self.agreement = PositionAgreement()
         """Of its 6064h with 606Ch."""
+        self.trim = 0.0
+        """Angle that corrections of the cable force have turned since the last homing, rad."""
         self.counter: PositionCounter | None = None
         """Of its 6064h; None before it is commissioned."""
         self._standstill: Standstill | None = None
@@ -136,6 +140,7 @@ class MotorPosition:
     def recall(self, kept: KeptPosition | None) -> None:
         """Take what the record says, before the first commissioning; None without one."""
         self._kept = kept
+        self.trim = 0.0 if kept is None else kept.trim
 
     def keep(self, *, closed: bool) -> KeptPosition | None:
         """The position for the record; None before the first feedback."""
@@ -150,6 +155,7 @@ class MotorPosition:
             serial=self._serial,
             objects=self._objects,
             unit=self._unit,
+            trim=self.trim,
         )
 
     def look(self, node: SdoNode) -> None:
@@ -202,11 +208,12 @@ class MotorPosition:
 
     def note_zero(self, doubt: str) -> None:
         """The drive has set its zero; ``doubt`` says why the position by it is not known yet."""
-        self._zero = doubt
+        self._zero, self.trim = doubt, 0.0
 
     def define(self, angle: float) -> None:
         """Let the motor at rest have an angle (rad), by a zero that is kept in the record."""
         if self.counter is not None:
+            self.trim = 0.0
             self.agreement.suspend()
             self.counter.define(round(angle / self._angle))
             self.agreement.resume()
