@@ -55,7 +55,8 @@ def failing(comparison: Comparison) -> list[str]:
         error = comparison.outputs[name]
         if at_noise(error):
             continue
-        scale, parts = scale_for(3 * error.rms, error.unit), [f"follows the {followed(error, 1)}"]
+        scale, article = scale_for(3 * error.rms, error.unit), "the " if error.follows else ""
+        parts = [f"follows {article}{followed(error, 1)}"]
         if error.bias**2 > _BIASED * error.rms**2:
             parts.append(f"mean {signed(error.bias, scale)}")
         if name in drawn:

@@ -13,7 +13,6 @@ from winchkit.quantity_text import (
     PrintScale,
     grouped,
     quantity,
-    scale_for,
     significant,
     unbroken,
 )
@@ -32,6 +31,7 @@ from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
     combination_text,
+    error_scale,
     estimate_text,
     interval_text,
     listed,
@@ -41,11 +41,6 @@ from winchkit.report.words.vocabulary import (
 
 _TOP = 10
 """Rows of a table that are open; the others are folded."""
-
-
-def output_scale(output: OutputFit) -> PrintScale:
-    """One scale for all errors of an output."""
-    return scale_for(output.heldout_rms_before, output.unit)
 
 
 def figures(diagnosis: Diagnosis) -> Markup:
@@ -58,7 +53,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
     rows = []
     for name in worst_outputs(diagnosis.outputs):
         output = diagnosis.outputs[name]
-        scale = output_scale(output)
+        scale = error_scale(output)
         last = output.heldout_rms_after if extended else output.heldout_rms_before
         cells: list[str] = [OUTPUT_NAMES.get(name, name)]
         cells.append(element("span", scale.text(output.heldout_rms_before), class_="before"))
@@ -124,7 +119,7 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
     def row(label: str, errors: Mapping[str, float]) -> list[str]:
         return [
             label,
-            *(bar(errors[n], longest[n], o.noise_rms, output_scale(o)) for n, o in outputs.items()),
+            *(bar(errors[n], longest[n], o.noise_rms, error_scale(o)) for n, o in outputs.items()),
         ]
 
     head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
@@ -172,7 +167,7 @@ def candidates(answer: Answer) -> Markup:
     if not ranked:
         return Markup("")
     outputs = diagnosis.outputs
-    scales = {name: output_scale(output) for name, output in outputs.items()}
+    scales = {name: error_scale(output) for name, output in outputs.items()}
     head = ["effect", "meaning", "evidence"]
     head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
     rows = [_candidate(candidate, scales) for candidate in ranked]

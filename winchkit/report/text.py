@@ -55,6 +55,7 @@ from winchkit.report.words.vocabulary import (
     VERDICT_NAMES,
     clause,
     combination_text,
+    error_scale,
     interval_text,
     parameter_name,
     values_text,
@@ -234,7 +235,7 @@ def error_lines(
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():
-        scale = scale_for(output.heldout_rms_before, output.unit)
+        scale = error_scale(output)
         noise = noise_text(output).removeprefix("noise ")
         after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
@@ -269,7 +270,7 @@ def _ladder(answer: Answer) -> list[str]:
     if ladder is None or len(ladder.first) < 2:
         return []
     outputs = answer.diagnosis.outputs
-    scales = {n: scale_for(o.heldout_rms_before, o.unit) for n, o in outputs.items()}
+    scales = {n: error_scale(o) for n, o in outputs.items()}
     states = [
         *ladder.rungs,
         *((f"only {name}", rms) for name, rms in ladder.first.items()),

@@ -17,7 +17,13 @@ from winchkit.report.html.markup import Markup, details, element, table
 from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.notebook.text import plan_screen, run_head, run_rows
 from winchkit.report.words.sentence import sentence
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VERDICT_NAMES, meaning, values_text
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    VERDICT_NAMES,
+    error_scale,
+    meaning,
+    values_text,
+)
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
@@ -90,7 +96,7 @@ def addition_cell(addition: Addition | Removal) -> str:
     ]
     errors = []
     for name, output in addition.outputs.items():
-        scale = tables.output_scale(output)
+        scale = error_scale(output)
         sizes = (output.heldout_rms_before, output.heldout_rms_after)
         noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
         errors.append([OUTPUT_NAMES.get(name, name), *map(scale.text, sizes), noise])

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.results import OutputFit
-from winchkit.quantity_text import scale_for, significant
+from winchkit.quantity_text import significant
 from winchkit.report import tables
 from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
@@ -21,7 +21,7 @@ from winchkit.report.words.sentence import (
     still_text,
     worse_text,
 )
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning, values_text
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, error_scale, meaning, values_text
 
 
 def addition_sections(
@@ -101,7 +101,7 @@ def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
     rows = []
     for name in worst_outputs(outputs):
         output = outputs[name]
-        scale = scale_for(output.heldout_rms_before, output.unit)
+        scale = error_scale(output)
         errors = [output.heldout_rms_before, output.heldout_rms_after]
         noise = output.noise_rms
         rows.append(

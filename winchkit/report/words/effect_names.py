@@ -49,6 +49,12 @@ EFFECTS: dict[str, tuple[str, str]] = {
     ),
     "home-length": ("cable length at home", "the cable length at home differs from the profile"),
     "tracker-delay": ("delay of the tracker", "the tracker is delayed against the bench"),
+    "tracker-frame": ("frame of the tracker", "the tracker stands in another frame"),
+    "tracker-scale": ("scale of the tracker", "the tracker's metre is wrong"),
+    "reflector-offset": (
+        "place of the reflector",
+        "the reflector is at another place of the platform",
+    ),
     "imu-mounting": (
         "mounting of the target or IMU",
         "the axes of the target or IMU are turned on the platform",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from winchkit.diagnosis.results import Comparison, OutputError, OutputFit
-from winchkit.quantity_text import quantity, scale_for, significant
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.quantity_text import quantity, significant
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, error_scale
 
 AT_NOISE = 1.15
 """Largest ratio of an error to its noise at which it counts as noise."""
@@ -64,7 +64,7 @@ def noise_text(output: OutputFit) -> str:
     """``noise 0.304 mm``; its two bounds where neither repeats nor instruments give it."""
     if output.noise_rms is None:
         return "noise unknown"
-    scale = scale_for(output.heldout_rms_before, output.unit)
+    scale = error_scale(output)
     return f"noise {scale.span(output.noise_rms, output.noise_upper)}"
 
 

@@ -12,7 +12,13 @@ from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
 from winchkit.report.words.steps import cause, reported
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, clause, listed
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    VARIABLE_NAMES,
+    clause,
+    error_scale,
+    listed,
+)
 
 _MOVED = 1.05
 """Ratio of held-out errors before and after above which a sentence names the output: 5 % is seen in
@@ -283,7 +289,7 @@ def worse_text(outputs: Mapping[str, OutputFit]) -> str:
 
 def _change(output: OutputFit) -> str:
     """``from 0.943 mm to 0.309 mm``."""
-    scale = scale_for(output.heldout_rms_before, output.unit)
+    scale = error_scale(output)
     return f"from {scale.text(output.heldout_rms_before)} to {scale.text(output.heldout_rms_after)}"
 
 

@@ -13,6 +13,7 @@ from winchkit.quantity_text import percent, scale_for, significant, with_std
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
+    error_scale,
     kind,
     listed,
     values_text,
@@ -124,7 +125,7 @@ def step_text(
     parts = [_titled_values(step)]
     if outputs and without and (name := lowered_most(outputs, without)):
         output = outputs[name]
-        scale = scale_for(output.heldout_rms_before, output.unit)
+        scale = error_scale(output)
         then = scale.text(output.heldout_rms_after)
         before = significant(without[name] / scale.worth)
         parts.append(f"{OUTPUT_NAMES.get(name, name)} {before} → {then}")

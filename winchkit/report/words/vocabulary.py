@@ -6,11 +6,13 @@ import re
 from collections.abc import Mapping
 from math import isfinite
 
-from winchkit.diagnosis.results import Combination, Estimate, series_orders
+from winchkit.diagnosis.results import Combination, Estimate, OutputFit, series_orders
 from winchkit.effects.series import fundamentals
-from winchkit.quantity_text import between, scale_for, with_std
+from winchkit.quantity_text import PrintScale, between, scale_for, with_std
 from winchkit.report.words.effect_names import EFFECTS
 
+_FAR = 300.0
+"""Ratio of two errors from which the smaller one has three zeros in the unit of the larger one."""
 VERDICT_NAMES = {
     "adequate": "Adequate",
     "explained": "Explained",
@@ -61,6 +63,12 @@ _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 def variable_name(variable: str) -> str:
     """Name of a variable in texts."""
     return VARIABLE_NAMES.get(variable, variable.replace("_", " "))
+
+
+def error_scale(output: OutputFit) -> PrintScale:
+    """One scale for all errors of an output: of the first one, or of a far smaller last one."""
+    before, after = output.heldout_rms_before, output.heldout_rms_after
+    return scale_for(before / _FAR if after < before / _FAR else before, output.unit)
 
 
 def clause(effect: str) -> str:

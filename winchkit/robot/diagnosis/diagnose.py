@@ -33,7 +33,11 @@ from winchkit.diagnosis.results import (
     plain_step,
 )
 from winchkit.diagnosis.search import ProgressCallback, no_progress
-from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.selection.stepwise import (
+    SelectionResult,
+    initial_result,
+    stepwise_selection,
+)
 from winchkit.diagnosis.steps import (
     Standing,
     candidates_of,
@@ -114,6 +118,12 @@ class RobotSelection:
     """Engine with the geometry of the file; the same object where the geometry was not free."""
     result: SelectionResult
     """Result of the selection, with the simplest laws."""
+
+    @classmethod
+    def of_geometry(cls, preparation: Preparation, file_engine: PoseSelection) -> RobotSelection:
+        """The geometry free, and no search: beside a wrong one an effect may imitate it."""
+        engine = preparation.free_geometry()
+        return cls(preparation, engine, file_engine, initial_result(engine))
 
     @classmethod
     def of(
@@ -388,7 +398,7 @@ def diagnose(
     file_engine = preparation.file_geometry()
     free: RobotSelection | None = None
     if _geometry_explains_far_more(preparation, file_engine):
-        free = RobotSelection.of(preparation, preparation.free_geometry(), file_engine)
+        free = RobotSelection.of_geometry(preparation, file_engine)
         if free.verdict in _EXPLAINING:
             return answer_of(free, "refitted")
     found = RobotSelection.of(preparation, file_engine, file_engine)
@@ -401,7 +411,7 @@ def diagnose(
         preparation.gain_of_geometry(file_engine, found.result.final.hypothesis, found.result.noise)
     ):
         return answer_of(found, "file")
-    free = free or RobotSelection.of(preparation, preparation.free_geometry(), file_engine)
+    free = free or RobotSelection.of_geometry(preparation, file_engine)
     if free.verdict in _EXPLAINING and found.remaining - free.remaining > _TENTH:
         return answer_of(free, "refitted")
     return answer_of(found, "file")
