@@ -46,7 +46,11 @@ RECENT = (
 )  # fmt: skip
 """Effects that the catalogue got after seeds were first drawn."""
 
-CATALOGUED = {"outside-crosstalk": "spring-balancer", "outside-clipping": "cell-clipping"}
+CATALOGUED = {
+    "outside-crosstalk": "spring-balancer",
+    "outside-clipping": "cell-clipping",
+    "outside-sticky-place": "load-friction-at-place",
+}
 """Physics that was outside the catalogue when seeds were first drawn, and its name there now."""
 
 

@@ -31,10 +31,13 @@ ONE = (
 )
 STRANGE = (
     ("outside-harmonic", 301),
-    pytest.param("outside-sticky-place", 302, marks=CAMPAIGN),
     pytest.param("outside-wander", 303, marks=CAMPAIGN),
 )
-NAMED_SINCE = (("outside-crosstalk", 303), pytest.param("outside-clipping", 304, marks=CAMPAIGN))
+NAMED_SINCE = (
+    ("outside-crosstalk", 303),
+    pytest.param("outside-clipping", 304, marks=CAMPAIGN),
+    pytest.param("outside-sticky-place", 302, marks=CAMPAIGN),
+)
 
 
 @pytest.mark.parametrize("seed", NOTHING)

@@ -60,6 +60,7 @@ LINEAR = {
     "torque-ripple",
     "friction-growth",
     "friction-at-place",
+    "load-friction-at-place",
     "cell-crosstalk",
     "cell-clipping",
 }

@@ -98,6 +98,12 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "width": ("rad", SHAPE),
         "transition": ("rad/s", 0),
     },
+    "load-friction-at-place": {
+        "force": ("N", 0),
+        "place": ("m", SHAPE),
+        "width": ("m", SHAPE),
+        "transition": ("m/s", 0),
+    },
     "cell-crosstalk": {"share": ("N/(N m)", 0)},
     "cell-clipping": {"share": ("1", 0), "limit": ("N", SHAPE)},
 }
@@ -150,7 +156,7 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
         "spring-balancer stribeck-of-load rotor-inertia",
         "gear-efficiency motor-coulomb torque-constant torque-lag",
         "cable-elongation-linear frame-compliance length-gain length-time-offset",
-        "load-gain cable-weight load-lever pulley-coulomb",
+        "load-gain cable-weight load-lever load-friction-at-place pulley-coulomb",
     ],
 )
 def test_effects_act_in_the_order_of_the_interface(chain: str) -> None:

@@ -332,6 +332,10 @@ CASES: dict[str, Case] = {
         {"torque": 0.05, "place": 3.0, "width": 2.0},
         lambda: _torque(0.05 * X.sm * np.exp(-((X.phi - 3.0) ** 2) / 4.0)),
     ),
+    "load-friction-at-place": (
+        {"force": 20.0, "place": 3.0, "width": 0.5},
+        lambda: _tension(X.T + 20.0 * X.s * np.exp(-((X.free - 3.0) ** 2) / 0.25)),
+    ),
     "cell-crosstalk": ({"share": 3.0}, lambda: {"tension": X.T + 3.0 * X.T * X.arm}),
     "cell-clipping": ({"share": 1.0, "limit": 300.0}, lambda: {"tension": np.minimum(X.T, 300.0)}),
 }

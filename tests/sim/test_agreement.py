@@ -77,6 +77,7 @@ PAIRS = [
     Pair("balancer", "spring-balancer"),
     Pair("growing drag", "friction-growth"),
     Pair("rough place", "friction-at-place"),
+    Pair("sticky place", "load-friction-at-place", names={"at": "place"}),
     Pair("rippled motor", "torque-ripple"),
     Pair("load lever", "load-lever"),
     Pair("leaking current", "cell-crosstalk"),

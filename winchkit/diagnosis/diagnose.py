@@ -427,7 +427,9 @@ def _steps(
     for place, own in enumerate(acts):
         without = engine.refit(final.hypothesis.without(first + place), noise)
         errors = engine.held_out_errors(without, noise, folds)
-        standing = standing_of(errors, outputs, sorted(own))
+        # The torque has every error of the tension: what is left there may be the cause of both.
+        upstream = {"tension"} if own == {"motor_torque"} else set[str]()
+        standing = standing_of(errors, outputs, sorted(own | upstream))
         trusted = bool(known.deciding & own) and not known.refuted & own
         standings.append(
             replace(

@@ -11,6 +11,8 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.model.stages import At
 from winchkit.model.variables import VARIABLES
 
+GRID_OF_PLACES = tuple((k + 0.5) / 12 for k in range(12))
+"""Shares of the stroke at which a place is first tried; its width is then a twelfth of it."""
 _BELOW = 0.1
 """Smallest extent over that of the grid."""
 _SAMPLES = 2.0

@@ -8,6 +8,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
+from winchkit.effects.location import GRID_OF_PLACES
+from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.stages import At, Stage
 from winchkit.units import GRAVITY
 
@@ -103,3 +105,38 @@ LOAD_LEVER = Effect(
     order=1,
     polar=("amplitude", "phase"),
 )
+
+
+def _load_friction_at_place(tension: Array, at: At, values: Values) -> Array:
+    distance = (at.free_length - values["place"]) / values["width"]
+    return tension + values["force"] * cable_direction(at, values) * np.exp(-(distance**2))
+
+
+LOAD_FRICTION_AT_PLACE = Effect(
+    id="load-friction-at-place",
+    stage=Stage.CABLE_WEIGHT,
+    parameters=(
+        Parameter("force", "N", null=0.0, typical=2.0, low=0.0, high=1e7),
+        Parameter(
+            "place", "m", null=0.0, typical=0.1, low=-1e5, high=1e5,
+            role="shape", grid=GRID_OF_PLACES, over="cable_length",
+        ),
+        Parameter(
+            "width", "m", null=1.0, typical=0.1, low=1e-5, high=1e4,
+            role="shape", grid=(1 / 12,), along="cable_length",
+        ),
+        CABLE_TRANSITION,
+    ),
+    apply=_load_friction_at_place,
+    outputs=("tension", "motor_torque"),
+    part="load",
+    what="The load, or the cable before the last pulley, has more friction around one position.",
+    formula="T + s F exp(−((ℓ − ℓ0)/w)²), ℓ the free length",
+    source="Coulomb friction with a smooth window",
+    looks_like="A bump of tension and torque error over the position, with the sign of the "
+    "direction.",
+    confused_with=("friction-at-place", "pulley-coulomb"),
+    told_apart="The tension, in which friction of the motor is not. The full stroke, both ways.",
+    needs=("load",),
+    order=2,
+)  # fmt: skip

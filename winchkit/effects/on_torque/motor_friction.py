@@ -6,6 +6,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.location import GRID_OF_PLACES
 from winchkit.effects.presliding import START, Presliding, sliding_distance
 from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
 from winchkit.model.stages import At, Stage
@@ -176,9 +177,6 @@ MOTOR_DAHL = Effect(
     dynamics=FRICTION.dynamics,
 )
 
-_PLACES = tuple((k + 0.5) / 12 for k in range(12))
-
-
 def _friction_at_place(torque: Array, at: At, values: Values) -> Array:
     distance = (at.drum_angle - values["place"]) / values["width"]
     return torque + values["torque"] * motor_direction(at, values) * np.exp(-(distance**2))
@@ -191,7 +189,7 @@ FRICTION_AT_PLACE = Effect(
         Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),
         Parameter(
             "place", "rad", null=0.0, typical=1.0, low=-1e6, high=1e6,
-            role="shape", grid=_PLACES, over="drum_angle",
+            role="shape", grid=GRID_OF_PLACES, over="drum_angle",
         ),
         Parameter(
             "width", "rad", null=1.0, typical=1.0, low=1e-4, high=1e5,
@@ -206,8 +204,8 @@ FRICTION_AT_PLACE = Effect(
     formula="τ + s c exp(−((φ − φ0)/w)²), φ the drum angle since the reference",
     source="Coulomb friction with a smooth window",
     looks_like="A bump of the torque error over the position, with the sign of the direction.",
-    confused_with=("motor-coulomb", "pulley-coulomb"),
-    told_apart="The full stroke in both directions; a pulley's place is in the tension too.",
+    confused_with=("load-friction-at-place", "motor-coulomb"),
+    told_apart="The full stroke in both directions; that of the load is in the tension too.",
 )  # fmt: skip
 
 

@@ -70,6 +70,10 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "the cable on the drum keeps the strain of its winding",
     ),
     "encoder-slip": ("slip of the drum's encoder", "the drum slipped against its encoder"),
+    "load-friction-at-place": (
+        "friction of the load at one position",
+        "the load has more friction at one position",
+    ),
     "friction-at-place": (
         "friction at one position",
         "the motor side has more friction at one position",
