@@ -177,6 +177,7 @@ MOTOR_DAHL = Effect(
     dynamics=FRICTION.dynamics,
 )
 
+
 def _friction_at_place(torque: Array, at: At, values: Values) -> Array:
     distance = (at.drum_angle - values["place"]) / values["width"]
     return torque + values["torque"] * motor_direction(at, values) * np.exp(-(distance**2))
