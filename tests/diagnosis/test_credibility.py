@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis_runs import term
-from winchkit.diagnosis.credibility import oversized, short_travel
+from diagnosis_runs import Ride, engine_for, term
+from winchkit.diagnosis.credibility import oversized, short_record
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
@@ -48,7 +48,20 @@ def test_a_law_over_a_degree_of_travel_is_not_certain(half_range: float, short: 
     noise = engine.fit_with_noise(engine.initial_model)[1]
     spring = term("spring-balancer", stiffness=STIFFNESS, torque=0.0)
     fitted = engine.fixed(engine.initial_model.with_term(spring, 1), noise)
-    assert (short_travel(engine.regression, fitted, 0) is not None) == short
+    assert (short_record(engine.regression, fitted, 0) is not None) == short
+
+
+@pytest.mark.parametrize(("time_constant", "short"), [(20.0, False), (448.0, True)])
+def test_a_memory_longer_than_the_runs_is_not_certain(time_constant: float, short: bool) -> None:
+    """A joint that opens above a load was a certain creep of 448 s in runs of 90 s."""
+    engine = engine_for([], Ride(samples=600, rate=10.0))
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    creep = term("cable-creep", creep_stiffness=6e5, time_constant=time_constant)
+    runs = engine.regression.n_runs
+    fitted = engine.fixed(engine.initial_model.with_term(creep, runs), noise)
+    reason = short_record(engine.regression, fitted, 0)
+    assert (reason is not None) == short
+    assert reason is None or "448 s, and the longest run lasts 59.9 s" in reason
 
 
 def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:
@@ -56,4 +69,4 @@ def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:
     smooth = [s for s in found.steps if {"spring-balancer", "joint-gravity"} & set(s.effects)]
     assert smooth
     assert not any(step.certain for step in smooth)
-    assert all("short-travel" in [doubt.code for doubt in step.doubts] for step in smooth)
+    assert all("short-record" in [doubt.code for doubt in step.doubts] for step in smooth)

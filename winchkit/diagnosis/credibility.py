@@ -1,8 +1,8 @@
 """Reasons why a fitted effect is not certain although it fits: what it implies cannot be seen.
 
 The plausible range of an axis follows its torque and acceleration: what an effect contributes to an
-output must be of the size of that output, and a law must be seen over a part of its variable in
-which it differs from a straight line.
+output must be of the size of that output, and a law must be seen over a part of its variable, or a
+time, in which it differs from a straight line.
 """
 
 from __future__ import annotations
@@ -45,14 +45,22 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
     return None
 
 
-def short_travel(regression: Regression, fit: Fit, index: int) -> str | None:
-    """Whether a smooth law over the angle was seen over too small a part of a turn, in words."""
-    effect = fit.hypothesis.terms[index].effect
-    if not isinstance(regression, TimeSeriesRegression) or effect.variable != "drum_angle":
+def short_record(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether a smooth law was seen over too small a part of a turn or of its time, in words."""
+    term = fit.hypothesis.terms[index]
+    if not isinstance(regression, TimeSeriesRegression):
         return None
-    if regression.dataset.profile.is_linear:  # a position has no turn
+    motions, slow = regression.motions, term.values.get("time_constant", 0.0)
+    longest = max(float(np.ptp(motion.time)) for motion in motions)
+    if slow > longest:
+        return (
+            f"its time constant is {quantity(slow, 's')}, and the longest run lasts "
+            f"{quantity(longest, 's')}: in so short a time it may be a law without memory"
+        )
+    # The position of a linear axis has no turn.
+    if term.effect.variable != "drum_angle" or regression.dataset.profile.is_linear:
         return None
-    travel = max(float(np.ptp(motion.drum_angle)) for motion in regression.motions)
+    travel = max(float(np.ptp(motion.drum_angle)) for motion in motions)
     if travel >= _LEAST_TRAVEL:
         return None
     return (

@@ -12,7 +12,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from winchkit.diagnosis.credibility import oversized, short_travel
+from winchkit.diagnosis.credibility import oversized, short_record
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import (
     COLLINEAR_DELAY,
@@ -159,7 +159,7 @@ def with_standing(
 
 
 _SERIOUS = frozenset(
-    {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel", "reversal"}
+    {"implausible", "collinear", "undetermined", "small", "oversized", "short-record", "reversal"}
 )
 """Doubts with which no step is certain."""
 
@@ -193,7 +193,7 @@ def _doubts(
         steps = result.final.iterations
         what = f"the fit did not converge in {steps} steps: its values may change"
         out.append(Doubt("not-converged", what))
-    for code, check in (("oversized", oversized), ("short-travel", short_travel)):
+    for code, check in (("oversized", oversized), ("short-record", short_record)):
         if reason := check(regression, result.final, index):
             out.append(Doubt(code, reason))
     sizes = {n: e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"}
