@@ -35,9 +35,11 @@ _STEPS = 2
 """Counts of 6064h by which the ends of a window are rounded."""
 _COARSEST = 0.01
 """Share of the greatest speed: no drive that follows a speed measures it more coarsely."""
-_GAP = 0.05
-"""Longer than a cycle, s: within it the speed may have gone straight from one value to the other,
-or up and down by the acceleration."""
+_GAP = 3.0
+"""Cycles without feedback that are a gap: within it the speed may have gone straight from one value
+to the other, or up and down by the acceleration."""
+_SHORTEST_GAP = 0.05
+"""The same at least, s: what is turned otherwise within less is less than a late 606Ch explains."""
 _new = tuple.__new__
 
 
@@ -127,7 +129,7 @@ class PositionAgreement:
     """The comparison for one drive; SI at the motor shaft."""
 
     __slots__ = (
-        "_active", "_finest", "_last", "_long", "_quarter", "_short", "_smallest", "_tolerance",
+        "_active", "_finest", "_gap", "_last", "_long", "_quarter", "_short", "_smallest", "_tolerance",
         "found",
     )  # fmt: skip
 
@@ -138,16 +140,18 @@ class PositionAgreement:
         response: float = 0.0,
         late: float = 0.0,
         fastest: float = 0.0,
+        cycle: float = 0.0,
     ) -> None:
         """Take a count of 6064h (rad) and 606Ch (rad/s), the response time (s), what the motor
-        turns from rest within that (rad), and its greatest speed (rad/s). Without a response time
-        nothing is compared.
+        turns from rest within that (rad), its greatest speed (rad/s), and the time between two
+        feedbacks (s). Without a response time nothing is compared.
         """
         step = max(velocity_step, _COARSEST * fastest)
         self._tolerance = _Tolerance(_STEPS * angle_step + late, step, response)
         self._finest, self._smallest = velocity_step, inf
         self._quarter = late / (2 * response**2) if response > 0 else 0.0
         """Of the acceleration, rad/s^2: a v-t triangle of length t has the area a t^2 / 4."""
+        self._gap = max(_SHORTEST_GAP, _GAP * cycle)
         self._active = response > 0
         self.found: Disagreement | None = None
         """The first disagreement since the last :meth:`forget`."""
@@ -187,7 +191,7 @@ class PositionAgreement:
             self._last = _WindowPoint(time, angle, 0.0, 0.0, velocity)
             return self.found is not None
         slack += _SHARE * abs(turned)
-        if span > _GAP:
+        if span > self._gap:
             slack += (abs(velocity - before) / 2 + self._quarter * span) * span
         self._last = point = _new(_WindowPoint, (time, angle, integral + turned, slack, velocity))
         if velocity != before:
