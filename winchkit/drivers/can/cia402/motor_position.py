@@ -197,7 +197,7 @@ class MotorPosition:
             self._watch.response,
             self._watch.late,
             self._watch.speed,
-            self._watch.cycle,
+            cycle=self._watch.cycle,
         )
         return counter
 

@@ -129,8 +129,8 @@ class PositionAgreement:
     """The comparison for one drive; SI at the motor shaft."""
 
     __slots__ = (
-        "_active", "_finest", "_gap", "_last", "_long", "_quarter", "_short", "_smallest", "_tolerance",
-        "found",
+        "_active", "_finest", "_gap", "_last", "_long", "_quarter", "_short", "_smallest",
+        "_tolerance", "found",
     )  # fmt: skip
 
     def __init__(
@@ -140,6 +140,7 @@ class PositionAgreement:
         response: float = 0.0,
         late: float = 0.0,
         fastest: float = 0.0,
+        *,
         cycle: float = 0.0,
     ) -> None:
         """Take a count of 6064h (rad) and 606Ch (rad/s), the response time (s), what the motor
