@@ -162,3 +162,16 @@ def test_a_reset_ends_a_motion_by_a_ramp_and_says_so(tmp_path: Path, motion: str
             winch.wait() if motion == "move" else winch.refresh()
         rig.wait(0.5)
         assert winch.cable_length == pytest.approx(rest, abs=1e-4)
+
+
+def test_a_stop_in_any_cycle_of_enabling_is_no_trip(tmp_path: Path) -> None:
+    """In one of them the drive is enabled and has not shown it yet: it "left" that state."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        winch = bench.winch["A"]
+        for number in range(12):
+            winch.jog(pay_out=0.05, hold=1.0)
+            rig.wait(number * bench.loop.cycle)
+            bench.stop()
+            assert not bench.snapshot.tripped, number
+            rig.wait(1.0)

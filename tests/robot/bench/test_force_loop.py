@@ -431,3 +431,32 @@ def test_the_pose_stays_that_of_the_plan_where_cells_correct_along_it(tmp_path: 
             winch = bench.winch["1"]
             winch.home(at=winch.cable_length)
             assert bench.snapshot.winch["1"].trim_angle == 0.0 != trims[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("trim", ["none", "along"])
+def test_a_stop_before_the_correction_has_begun_leaves_pose_and_trims(trim: str) -> None:
+    """Once they were NaN after a stop while the drives were being enabled, and in the record."""
+    sim = read_simbench(find("sim", "winding-device-robot"))
+    assert sim.bench.robot is not None
+    bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
+    wiring = replace(sim.bench.robot, tension_trim=trim, axial_stiffness=200e3)
+    sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
+    clock = SimulatedClock()
+    with (
+        LiveBench(sim, seed=2, simulated_time=clock) as live,
+        open_bench(live.bench_spec, clock) as bench,
+    ):
+        clock.sleep(0.5)
+        for number in range(8):
+            if trim == "none":
+                bench.robot.hold(preload=520.0, hold=1.0)
+            else:
+                goal = bench.robot.moved({"x": 0.002}, relative=True)
+                bench.robot.move(goal, 0.05, 0.2, wait=False)
+            clock.sleep(number * CYCLE)
+            bench.stop()
+            assert not bench.snapshot.tripped
+            assert np.isfinite([one.trim_angle for one in bench.snapshot.winch.values()]).all()
+            assert np.isfinite(bench.robot.pose.position).all()
+            clock.sleep(1.0)  # as after the release of a key

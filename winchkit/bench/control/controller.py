@@ -240,11 +240,13 @@ class Controller:
         with self._lock:
             ordered, self._ordered = self._ordered, None
             wanted = self._wanted
-        if ordered is Phase.STOPPING:
+        # What is being enabled does not move yet, and may not have shown that it is enabled.
+        enabling = ordered is Phase.RUN_DOWN and self.phase is Phase.ENABLING
+        if ordered is Phase.STOPPING or enabling:
             self._enter(Phase.STOPPING, now)
         elif ordered is Phase.RESETTING and self.phase is Phase.DISABLED:
             self._enter(Phase.RESETTING, now)
-        elif ordered is Phase.RUN_DOWN and self.phase in (Phase.ENABLING, Phase.MOVING):
+        elif ordered is Phase.RUN_DOWN and self.phase is Phase.MOVING:
             self._begin_run_down(now)
         elif ordered is Phase.RUN_DOWN and self.phase is Phase.DISABLED:
             self.done = wanted is None
