@@ -91,6 +91,7 @@ class FakeAxis:
 
     silent: bool = False
     position_doubt: str = ""
+    trim_angle: float = 0.0
 
     @property
     def position_mark(self) -> tuple[int, int, str, bool]:
