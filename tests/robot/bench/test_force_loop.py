@@ -375,7 +375,7 @@ def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(structure: Array
     pose=st.lists(st.floats(-1e-3, 1e-3), min_size=6, max_size=6),
     spread=st.lists(st.floats(0.5, 1.5), min_size=8, max_size=8),
 )
-def test_cable_wound_for_forces_is_told_from_a_change_of_the_pose(
+def test_cable_wound_for_forces_changes_no_pose(
     structure: Array, forces: list[float], pose: list[float], spread: list[float]
 ) -> None:
     """Beside a pose loop; alone a force loop changes nothing else, and a pose loop no forces."""
@@ -435,7 +435,7 @@ def test_the_pose_stays_that_of_the_plan_where_cells_correct_along_it(tmp_path: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("trim", ["none", "along"])
-def test_a_stop_before_the_correction_has_begun_leaves_pose_and_trims(trim: str) -> None:
+def test_a_stop_before_a_correction_starts_leaves_pose_and_trims(trim: str) -> None:
     """Once they were NaN after a stop while the drives were being enabled, and in the record."""
     sim = read_simbench(find("sim", "winding-device-robot"))
     assert sim.bench.robot is not None

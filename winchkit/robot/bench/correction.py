@@ -175,8 +175,8 @@ class CableCorrection:
         self._begin = self._slope = self._trimmed = math.nan
 
     @property
-    def begun(self) -> bool:
-        """Whether its winch has begun with the others."""
+    def started(self) -> bool:
+        """Whether its winch has started with the others."""
         return not math.isnan(self._begin)
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
@@ -189,7 +189,7 @@ class CableCorrection:
     def at(self, time: float, now: float) -> tuple[float, float]:
         """Cable wound in since the start (m) and winding speed (m/s)."""
         found = self.correction.at(self._index, time, now)
-        if self.begun:
+        if self.started:
             elongation = float(self.correction.elongation[self._index])
             self._axis.trim_angle = self._trimmed + elongation * self._slope
         return found
