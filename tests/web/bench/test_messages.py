@@ -275,7 +275,7 @@ def test_a_page_requests_the_command_and_gets_it_when_it_is_handed_over(
     assert page.station.calls[-1][0] == "close"
 
 
-def test_a_page_that_closes_while_it_gets_the_command_holds_it_for_nobody(
+def test_a_page_that_closes_while_it_gets_the_command_does_not_keep_it(
     page: Page, other: Page
 ) -> None:
     page.send({"do": "leave"})
