@@ -319,10 +319,10 @@ async function drawTime() {
       address();
       clearTimeout(zoom.timer); zoom.timer = setTimeout(drawTime, 60);
     };
-    const xLabel = "time [s]", marked = brushed ? brushed.time : null;
+    const xLabel = "time [s]", marked = brushed && brushed.time;
     const figure = () => ({ title: `${data.name}: measured and predicted, and the residual`, source: source(), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
       panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, runs, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
-        { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, runs: data.runs, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }, ...(marked ? [{ name: `marked [${data.residual_unit}]`, x: marked, y: brushed.residual, tone: "brush", points: true }] : [])] }] });
+        { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, runs: data.runs, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }, ...(brushed ? [{ name: `marked [${data.residual_unit}]`, x: brushed.time, y: brushed.residual, tone: "brush", points: true }] : [])] }] });
     if (!view.compared) {
       fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}; not compared yet`)), legend(["edge", "measured"])), upper);
       plot(upper, [data.x, data.measured], [line("ink", 1.6, 0.7)], { height: 120, top: 22, left: 58, runs, zoom, xLabel: "s", sync: "time", names: ["measured"], unit: data.unit, label: `${data.name}, measured over time` });
