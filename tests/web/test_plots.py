@@ -226,3 +226,18 @@ def test_targets_of_a_phone_are_44_px_high(browser: Any, served: Served, view: s
     assert page.evaluate("document.documentElement.scrollWidth") == size["width"]
     assert complaints == []
     page.context.close()
+
+
+def test_the_dialog_of_a_new_profile_fits_a_phone(browser: Any, served: Served) -> None:
+    page, complaints = opened(browser, served.url, viewport={"width": 390, "height": 844})
+    until(page, lambda: page.locator(".of-runs > button").count() == 2)
+    page.click(".of-runs > button >> nth=1")
+    page.click("#dialog >> text=New profile…")
+    until(page, lambda: page.locator(".drawing label").count() > 5)
+    assert (
+        page.evaluate("(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)(dialog)") == 0
+    )
+    narrow = page.locator(".drawing label > span:first-child").first.bounding_box()
+    assert narrow["width"] > 300, "words beside their field would have 60 px"
+    assert complaints == []
+    page.context.close()
