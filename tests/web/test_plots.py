@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,7 +15,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import NEEDS_CHROMIUM, Served, number, opened, until
+from browsing import NEEDS_CHROMIUM, Served, number, opened, texts, until
 
 pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 SMALL = """() => [...document.querySelectorAll("button, select, input, a, summary")]
@@ -160,6 +162,60 @@ def test_any_channel_over_another_is_chosen_drawn_and_saved(
     page.context.close()
 
 
+def drawing(page: Any, name: str, path: Path) -> list[str]:
+    """Texts of an exported drawing."""
+    with page.expect_download() as waiting:
+        page.select_option(f"[aria-label='Save {name}']", "SVG")
+    waiting.value.save_as(path)
+    return [str(node.text) for node in ElementTree.parse(path).findall(".//{*}text")]
+
+
+LABELS = """() => [...document.querySelectorAll("#ladder .name > span:first-child")]
+    .map((one) => one.firstChild.textContent)"""
+
+
+def test_exports_show_what_is_seen(browser: Any, served: Served, tmp_path: Path) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
+    ladder = drawing(page, "ladder", tmp_path / "ladder.svg")
+    labels = page.evaluate(LABELS)
+    assert len(labels) > 2
+    assert {*labels, *filter(None, texts(page, "#ladder .value"))} <= set(ladder)
+    over = page.locator("#over .u-over").first
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 60, box["y"] + 30, steps=4)
+    page.mouse.up()
+    until(page, lambda: "samples" in page.inner_text("#brush"))
+    curves = drawing(page, "cable_length-over-time", tmp_path / "time.svg")
+    loads = {text.rpartition(" ")[0].split()[-1] for text in curves if text.endswith(" kg")}
+    assert loads == {"10", "20"}, "each run with its load"
+    marked = "#7B2FA8"
+    assert marked in (tmp_path / "time.svg").read_text()
+    shares = drawing(page, "cable_length-residual", tmp_path / "over.svg")
+    assert sum(text.endswith(" %") for text in shares) == page.locator("#over h3").count()
+    assert marked in (tmp_path / "over.svg").read_text()
+    assert complaints == []
+    page.context.close()
+
+
+COLOURS = """() => [...document.querySelectorAll("#channels .legend i")]
+    .map((one) => getComputedStyle(one).backgroundColor.match(/\\d+/g).map(Number))"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_two_runs_have_one_colour(browser: Any, served: Served, scheme: str) -> None:
+    page, complaints = diagnosed(browser, served.url, color_scheme=scheme)
+    page.click("#channels summary")
+    until(page, lambda: page.locator("#channels .u-over").count() > 0)
+    found = page.evaluate(COLOURS)
+    assert len(found) == 8
+    assert min(math.dist(*pair) for pair in combinations(found, 2)) > 50
+    assert complaints == []
+    page.context.close()
+
+
 @pytest.mark.parametrize("view", ["diagnose", "library"])
 def test_targets_of_a_phone_are_44_px_high(browser: Any, served: Served, view: str) -> None:
     size = {"width": 390, "height": 844}
@@ -168,5 +224,20 @@ def test_targets_of_a_phone_are_44_px_high(browser: Any, served: Served, view: s
     until(page, lambda: page.locator(ready).count() == 1)
     assert page.evaluate(SMALL) == []
     assert page.evaluate("document.documentElement.scrollWidth") == size["width"]
+    assert complaints == []
+    page.context.close()
+
+
+def test_the_dialog_of_a_new_profile_fits_a_phone(browser: Any, served: Served) -> None:
+    page, complaints = opened(browser, served.url, viewport={"width": 390, "height": 844})
+    until(page, lambda: page.locator(".of-runs > button").count() == 2)
+    page.click(".of-runs > button >> nth=1")
+    page.click("#dialog >> text=New profile…")
+    until(page, lambda: page.locator(".drawing label").count() > 5)
+    assert (
+        page.evaluate("(({ scrollWidth, clientWidth }) => scrollWidth - clientWidth)(dialog)") == 0
+    )
+    narrow = page.locator(".drawing label > span:first-child").first.bounding_box()
+    assert narrow["width"] > 300, "words beside their field would have 60 px"
     assert complaints == []
     page.context.close()

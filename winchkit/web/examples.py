@@ -9,6 +9,7 @@ from pathlib import Path
 
 from winchkit.catalog import find
 from winchkit.errors import UsageError
+from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.schema.simbench import SimBench
@@ -38,9 +39,9 @@ class ExampleRuns:
 
     @property
     def truth(self) -> str:
-        """Hidden effects, or ``nothing``."""
+        """Names and identifiers of the hidden effects, or ``nothing``."""
         found = [a for t in self.bench.truth.values() for spec in t.hidden for a in spec.answers]
-        return ", ".join(found) or "nothing"
+        return ", ".join(f"{effect_name(effect)} ({effect})" for effect in found) or "nothing"
 
     @property
     def runs(self) -> Iterator[Run]:

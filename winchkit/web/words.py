@@ -8,6 +8,8 @@ from pathlib import Path
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 _REPLACED = re.compile(r", or (?:replace|write over) it \(--replace[^)]*\)")
 """A way that the page does not offer."""
+INTERNAL = "failed by a fault of winchkit; the terminal that serves this page has the details"
+"""In place of what an exception of Python says."""
 
 
 def page_text(text: str) -> str:

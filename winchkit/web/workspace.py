@@ -29,6 +29,7 @@ from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import write_wave_on_drum
 from winchkit.errors import Fault, FileError, UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
+from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -42,7 +43,7 @@ from winchkit.web.foreign import import_command, imported
 from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, PageState, Version
-from winchkit.web.words import free_path, page_text
+from winchkit.web.words import INTERNAL, free_path, page_text
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
@@ -50,8 +51,6 @@ _READERS = 2
 """Files that are read at once: a parser of large files runs beside the interpreter."""
 _LONG = 200_000
 """Samples above which runs are drawn before they are compared, which takes seconds."""
-INTERNAL = "failed by a fault of winchkit; the terminal that serves this page has the details"
-"""In place of what an exception of Python says."""
 _LOGGER = logging.getLogger(__name__)
 _NO_NAME = re.compile(r'[\x00-\x1f<>:"/\\|?*]+')
 """Characters that a name of a file lacks on one of the systems."""
@@ -62,6 +61,10 @@ def _read(path: str | Path) -> Run | FileError:
         return read_run(path)
     except FileError as error:
         return error
+
+
+def _duration(minutes: float) -> str:
+    return f"{minutes:.1f} minutes" if minutes >= 1 else f"{60 * minutes:.0f} seconds"
 
 
 class Cancelled(Exception):
@@ -156,7 +159,7 @@ class DiagnoseView:
 
     def add(self, effect: str) -> Future[None]:
         """Add an effect to the profile, refitted, and diagnose again."""
-        return self.task(f"adding {effect}", lambda: self._add(effect))
+        return self.task(f"adding {effect_name(effect)}", lambda: self._add(effect))
 
     def example(self, name: str) -> Future[None]:
         """Simulate runs of a bench of the catalogue, and open them with its profile."""
@@ -247,12 +250,12 @@ class DiagnoseView:
         path = self._free("next.toml")
         write_programme(found.programme(path.stem), path)
         best = found.offers[0]
-        shows = ", ".join(best.shows) or "no further effect"
+        shows = ", ".join(map(effect_name, best.shows)) or "no further effect"
         runs, profile = self._state.selection()
         return {
             "file": self.named(path),
             "text": path.read_text(encoding="utf-8"),
-            "words": f"{best.kind.name}, {best.minutes:.1f} minutes; it would show {shows}",
+            "words": f"{best.kind.name}, {_duration(best.minutes)}; it would show {shows}",
             "command": f"winchkit plan {runs} -p {profile} -o {shlex.quote(self.named(path))}",
         }
 

@@ -237,7 +237,7 @@ def test_check_of_a_bench_reports_how_each_drive_notices_a_dead_host(tmp_path: P
     code, output = check(bench_of(tmp_path))
     assert code == 0
     for winch in "AB":
-        assert f"winch {winch}: loss of the host by heartbeat: reacts as set in 6007h" in output
+        assert f"winch {winch}: loss of the host by heartbeat: it reacts as set in 6007h" in output
 
 
 def test_a_bench_is_refused_where_a_drive_notices_no_dead_host(tmp_path: Path) -> None:

@@ -248,6 +248,9 @@ def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     wrong = invoke("compare", both, "-p", "bench-spiral", "--winch", "C")
     assert wrong.exit_code == 2
     assert "no winch 'C'; it has A, B" in wrong.stderr
+    other = invoke("compare", runs[0], "-p", "bench-spiral", "--winch", "B")
+    assert (other.exit_code, other.stdout) == (2, ""), "its metadata name winch A"
+    assert "no winch 'B'; it has A" in other.stderr
 
 
 @pytest.fixture(scope="module")

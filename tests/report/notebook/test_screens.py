@@ -99,7 +99,10 @@ def test_a_run_shows_its_channels_with_their_ranges(results: dict[str, Any]) -> 
 def test_a_profile_shows_what_its_file_declares(results: dict[str, Any]) -> None:
     text = repr(results["profile"])
     assert "winding radius 60.00 mm" in text
-    assert "wrap 60.00°" in text
+    assert [line.split("wrap ")[-1] for line in text.splitlines() if "pulley" in line] == [
+        "90.00°",
+        "60.00°",
+    ]
     assert "ratio 20.4" in text
     assert "exit point (861.1 mm" in repr(results["robot"])
 

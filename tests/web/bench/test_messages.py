@@ -26,6 +26,7 @@ from winchkit.web.bench.browser import Browser
 from winchkit.web.bench.messages import decoded
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.view import BenchView
+from winchkit.web.words import INTERNAL
 
 BENCH = """schema = 1
 kind = "bench"
@@ -245,6 +246,44 @@ def test_a_page_that_only_watches_orders_nothing_and_its_late_signs_of_life_are_
     assert page.station.calls == []
 
 
+@pytest.fixture
+def other(page: Page, monkeypatch: pytest.MonkeyPatch) -> Iterator[Page]:
+    """A second open page, which watches."""
+    monkeypatch.setattr("winchkit.web.bench.view.attach", lambda *_, **__: Station())
+    folder = page.view.folder
+    browser = Browser("other", page.view.spec, Programmes(page.view.spec, folder, folder))
+    page.view._open |= {page.browser, browser}
+    yield Page(page.view, browser, page.station, page.loop)
+    page.view._open.clear()
+    page.view._requesting = None
+
+
+def test_a_page_requests_the_command_and_gets_it_when_it_is_handed_over(
+    page: Page, other: Page
+) -> None:
+    view = page.view
+    assert other.send({"do": "command"}) == ""
+    assert (view._commander, view._requesting) == (page.browser, other.browser)
+    page.send({"do": "keep_command"})
+    assert (view._commander, view._requesting) == (page.browser, None)
+    assert other.browser.said["text"] == "The other page keeps the command."
+    other.send({"do": "command"}, {"do": "leave"})
+    assert view._requesting is None, "withdrawn"
+    other.send({"do": "command"})
+    page.send({"do": "leave"})
+    assert (view._commander, view._requesting) == (other.browser, None)
+    assert page.station.calls[-1][0] == "close"
+
+
+def test_a_page_that_closes_while_it_gets_the_command_does_not_keep_it(
+    page: Page, other: Page
+) -> None:
+    page.send({"do": "leave"})
+    page.view._open.discard(other.browser)
+    other.send({"do": "command"})
+    assert page.view._commander is None
+
+
 def test_what_ended_a_motion_is_reported_once_and_only_to_the_page_that_ordered_it(
     page: Page,
 ) -> None:
@@ -283,7 +322,7 @@ def test_a_message_that_repeats_is_said_again_and_one_that_is_over_goes(page: Pa
 def test_a_defect_is_said_and_the_page_goes_on(page: Page) -> None:
     page.station.error = RuntimeError("broken")
     asked = {"do": "move", "winch": "A", "to": 2.5, "speed": 0.05}
-    assert page.send({**asked, "seen": now()}) == "defect of winchkit: RuntimeError: broken"
+    assert page.send({**asked, "seen": now()}) == f"The order {INTERNAL}."
     assert page.send({**asked, "seen": now()}) == ""
     assert [call[0] for call in page.station.calls] == ["move"]
 

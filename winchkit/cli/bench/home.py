@@ -65,7 +65,7 @@ def command(
     effects: Sequence[str],
     dry_run: bool,
 ) -> None:
-    """Home WINCH: by a method of its drive, or by telling it the present cable length.
+    """Home WINCH: by a method of its drive, or by the present cable length as you measured it.
 
     The drive keeps the zero for as long as it is powered, one with an absolute encoder longer; the
     record of positions keeps that of --here where the drive cannot. A search moves the cable by the

@@ -210,8 +210,9 @@ def _of_winch(run: Run, winch: str | None) -> Run:
                 "or use compare or diagnose with --winch all for each by itself"
             )
         return run.of_winch(known[0])
-    if known != [""] and winch not in known:
-        raise UsageError(f"{run.path}: no winch '{winch}'; it has {', '.join(known)}")
+    named = known if known != [""] else list(filter(None, [run.metadata.get("winch")]))
+    if named and winch not in named:
+        raise UsageError(f"{run.path}: has no winch '{winch}'; it has {', '.join(named)}")
     return run.of_winch(winch if known != [""] else "")
 
 

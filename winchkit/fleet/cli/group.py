@@ -26,4 +26,4 @@ COMMANDS = {
     ),
 )
 def command() -> None:
-    """Tables of the runs of a folder, kept beside them; the files stay the truth."""
+    """Tables of the runs of a folder, kept beside them and renewed from them."""

@@ -16,7 +16,10 @@ _LEFT_OUT = {"name", "description", "ledger", "effect", "rules"}
 
 
 def declared_rows(profile: Any) -> list[list[str]]:
-    """Parts of a profile with the values that differ from the defaults, a row each."""
+    """Parts of a profile with the values that differ from the defaults, a row each.
+
+    Parts of one kind have all of their quantities, so that rows can be compared.
+    """
     rows = []
     for field in dataclasses.fields(profile):
         if field.name in _LEFT_OUT or not field.init:
@@ -25,7 +28,7 @@ def declared_rows(profile: Any) -> list[list[str]]:
         if isinstance(value, tuple):
             for number, one in enumerate(value, start=1):
                 name = getattr(one, "name", str(number))
-                rows.append([f"{field.name} {name}", ", ".join(_values(one))])
+                rows.append([f"{field.name} {name}", ", ".join(_values(one, whole=True))])
         elif dataclasses.is_dataclass(value):
             rows.append([field.name, ", ".join(_values(value))])
         elif isinstance(value, Mapping):
@@ -38,8 +41,8 @@ def _effect(table: EffectTable) -> str:
     return ", ".join(f"{key} {value}" for key, value in table.values.items()) or "declared"
 
 
-def _values(part: Any) -> Iterator[str]:
-    """Values of a declared table that differ from their defaults."""
+def _values(part: Any, *, whole: bool = False) -> Iterator[str]:
+    """Values of a declared table that differ from their defaults; of a whole one all quantities."""
     if not dataclasses.is_dataclass(part):
         yield str(part)
         return
@@ -47,7 +50,9 @@ def _values(part: Any) -> Iterator[str]:
     units = _units(kind)
     for field in dataclasses.fields(part):
         value = getattr(part, field.name)
-        if field.name == "name" or value is None or value in (field.default, ()):
+        if field.name == "name" or value is None or value == ():
+            continue
+        if value == field.default and not (whole and field.name in units):
             continue
         if dataclasses.is_dataclass(value):
             shown = getattr(value, "name", "") or ", ".join(_values(value))

@@ -12,6 +12,7 @@ from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import ChannelCandidate, Choice, Question
 from winchkit.runs.importing.clocks.row_order import rows_in_order
+from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, NamedChannel, meaning_of
 from winchkit.runs.importing.orientation import (
@@ -257,9 +258,10 @@ def _unread(column: FileColumn) -> list[str]:
     is_numeric = 2 * sum(any(map(str.isdigit, text)) for text in cells) > len(cells)
     if meaning.channel in {IGNORED, CURRENT, "time", DATE} or not is_numeric:
         return []
+    unread = (text for text in cells if number(text, ".") is None)
     return [
-        f"'{column.source}' is named like {meaning.channel} and is left out: its cells are no "
-        f"numbers, e.g. '{cells[0]}'"
+        f"'{column.source}' is named like {meaning.channel} and is left out: it has cells that are "
+        f"no numbers, such as '{next(unread, cells[0])}'"
     ]
 
 

@@ -24,7 +24,8 @@ from winchkit.web.bench.programmes import Programmes
 from winchkit.web.words import page_text
 
 BEGINS_NOTHING = frozenset(
-    {"show", "leave", "release", "alive", "programme", "end_programme", "end_record"}
+    {"show", "leave", "keep_command", "release", "alive"}
+    | {"programme", "end_programme", "end_record"}
 )
 """Messages that may come late: they end something, or say that the page is seen."""
 

@@ -46,7 +46,7 @@ from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
 from winchkit.web.views import attachment
-from winchkit.web.words import free_path
+from winchkit.web.words import INTERNAL, free_path
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -129,6 +129,8 @@ class BenchView:
         self._orders = ThreadPoolExecutor(_ORDERS, "page-order")
         """Threads of their own: neither Stop nor a jog waits behind a picture that is computed."""
         self._commander: Browser | None = None
+        self._requesting: Browser | None = None
+        """Page that asked for the command while another one has it."""
         self._browsers = 0
         self._open: set[Browser] = set()
         self._leaving: set[Future[None]] = set()
@@ -280,7 +282,7 @@ class BenchView:
 
     def _stop_now(self) -> None:
         """Quick-stop by a station of its own, which waits behind no other call."""
-        with attach(self.file, self.effects, name="page, Stop", observer=True) as station:
+        with attach(self.file, self.effects, name="Stop on the page", observer=True) as station:
             station.stop()
 
     # Watching.
@@ -344,6 +346,8 @@ class BenchView:
                     "lost": self._lost,
                     "you_command": self._commander is browser,
                     "commander": self._commander.name if self._commander else "",
+                    "you_request": self._requesting is browser,
+                    "requested": self._commander is browser and self._requesting is not None,
                     "said": browser.said,
                     "undo_tare": browser.undo_tare,
                     "recording": browser.recording(),
@@ -363,9 +367,7 @@ class BenchView:
             listening.cancel()
             for task in working:
                 task.cancel()
-            if self._commander is browser:
-                self._commander = None
-            leaving = self._orders.submit(browser.leave)
+            leaving = self._orders.submit(self._leave, browser)
             self._leaving.add(leaving)
             leaving.add_done_callback(self._leaving.discard)
 
@@ -383,9 +385,9 @@ class BenchView:
                 browser.say(str(error))
                 refused = held
                 continue
-            except Exception as error:
+            except Exception:
                 _LOGGER.exception("the order %s failed", asked)
-                browser.say(f"defect of winchkit: {type(error).__name__}: {error}")
+                browser.say(f"The order {INTERNAL}.")
                 refused = held
                 continue
             refused = False
@@ -401,9 +403,10 @@ class BenchView:
             await self._in(self._orders, self._give_command, browser)
             return
         if order == "leave":
-            if self._commander is browser:
-                self._commander = None
-            await self._in(self._orders, browser.leave)
+            await self._in(self._orders, self._leave, browser)
+            return
+        if order == "keep_command":
+            self._keep_command(browser)
             return
         if self._commander is not browser:
             if order in BEGINS_NOTHING:
@@ -434,6 +437,30 @@ class BenchView:
         if not self.allow_motion:
             raise UsageError("this page only watches: it was started without permission to move")
         if self._commander is not None and self._commander is not browser:
-            raise UsageError(f"{self._commander.name} commands; it must release the bench first")
+            self._requesting = browser
+            return
         browser.take(attach(self.file, self.effects, name=browser.name))
         self._commander = browser
+        if browser not in self._open:  # closed meanwhile
+            self._leave(browser)
+
+    def _keep_command(self, browser: Browser) -> None:
+        """Refuse the request of another page."""
+        if self._commander is browser and self._requesting is not None:
+            self._requesting.say("The other page keeps the command.")
+            self._requesting = None
+
+    def _leave(self, browser: Browser) -> None:
+        """End the command of a page, or its request; a page that requests it gets the command."""
+        if self._requesting is browser:
+            self._requesting = None
+        if self._commander is not browser:
+            return
+        self._commander = None
+        browser.leave()
+        following, self._requesting = self._requesting, None
+        if following is not None:
+            try:
+                self._give_command(following)
+            except WinchkitError as error:
+                following.say(str(error))

@@ -12,6 +12,7 @@ import { card, lengthOf, picture as drawn, words as said } from "./winch.js";
 
 // Values that are older than `OLD` ms, twenty pictures, are grey, and nothing is offered.
 const PERIOD = 50, OLD = 1000, LOOK = 250, ANSWER = 3000, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
+const ONLY_WATCHES = "only watching: this page was started without permission to move";
 let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
@@ -190,7 +191,7 @@ const words = (state) => said(state, tripped().length > 0);
 // States of a drive (CiA 402) in words; its own name for the state is the tooltip.
 const OFF = ["not ready to switch on", "switch on disabled", "ready to switch on", "switched on"];
 const DRIVE = { ...Object.fromEntries(OFF.map((name) => [name, "drive off"])), "operation enabled": "drive on", "quick stop active": "quick stop", fault: "drive fault", "fault reaction active": "drive fault" };
-const by = (name) => (!name || commands() ? "" : name.startsWith("page ") ? "commanded from another tab" : `commanded by ${name}`);
+const by = (name) => (!name || old() || commands() ? "" : name.startsWith("page ") ? "commanded from another tab" : `commanded by ${name}`);
 const drum = (name) => (picture && picture.status.drum && picture.status.drum[name]) || { turns: null, radius: null, guide: null };
 
 function show() {
@@ -200,6 +201,7 @@ function show() {
   review();
   document.body.classList.toggle("old", old());
   for (const node of document.querySelectorAll(".offers, #dialog")) node.inert = old();
+  requested(document.getElementById("request"));
   progress(document.getElementById("programme"), picture && picture.programme, send);
   if (root) refresh();
 }
@@ -237,7 +239,7 @@ function build() {
     el("div", { class: "row context" }, names.length > 1 ? [el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => chooseWinch(name) }, name)))] : null,
       el("span", { class: "segments", id: "tabs" }, tabs().map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
       el("span", { class: "row end offers" }, el("span", { id: "says", class: "note" }),
-        declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
+        declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: take }, "Request command")] : el("span", { class: "note" }, ONLY_WATCHES))),
     el("div", { class: `bench-grid${names.length > 1 ? " several" : ""}` },
       el("div", { class: "column" }, el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
         names.length > 1 ? el("section", { class: "panel", "aria-label": "All winches" }, el("div", { id: "cards" })) : null),
@@ -260,6 +262,16 @@ function build() {
   refresh();
 }
 
+// Requests the command, takes the request back, or releases the command.
+const take = () => send(commands() || picture?.you_request ? "leave" : "command");
+const takeWords = () => (commands() ? "Release command" : picture?.you_request ? "Withdraw request" : "Request command");
+
+// Another page that requests the command: this one hands it over or keeps it.
+function requested(host) {
+  const asked = Boolean(picture && picture.requested && !old());
+  if (asked !== Boolean(host.firstChild)) fill(host, asked && el("div", { class: "alert", role: "alert" }, el("div", {}, "Another page requests the command of this bench."), el("button", { onclick: () => send("leave") }, "Hand over"), el("button", { onclick: () => send("keep_command") }, "Keep")));
+}
+
 function chooseWinch(name) { release(); winch = name; orders.forget(); send("show", { winch }); build(); }
 
 function tare() { const own = winch; if (!refused()) orders.tare(own, declared.winch[own].limits.tension, tensions, () => send("tare", { winch: own })); }
@@ -278,7 +290,7 @@ const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Driv
 
 function hold(sign) {
   if (refused()) return;
-  if (!jogSpeed()) { alarm(`The cable length of winch ${winch} is unknown, and limits.unhomed = "none" forbids jogs: home it first, winchkit home ${winch} --here LENGTH.`, "refused", () => !jogSpeed()); return; }
+  if (!jogSpeed()) { alarm(`The cable length of winch ${winch} is unknown, and limits.unhomed = "none" forbids jogs: home it first, in a terminal by winchkit home.`, "refused", () => !jogSpeed()); return; }
   alarm("", "bench");
   release();
   held = sign;
@@ -292,7 +304,7 @@ function hold(sign) {
 // What the Robot view may order of a robot's bench.
 const platform = {
   allowed: () => declared.allow_motion, commands, old, ago, tripped: () => tripped().length > 0,
-  command: () => send(commands() ? "leave" : "command"), taken: () => Boolean(picture && picture.commander && !commands()),
+  command: take, words: takeWords, watches: ONLY_WATCHES,
   step: (axis, change, speed) => { if (refused()) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
 };
 
@@ -386,8 +398,8 @@ function refresh() {
   const own = declared.winch[winch].limits, at = performance.now();
   mark();
   offer();
-  const take = document.getElementById("take");
-  if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
+  const button = document.getElementById("take");
+  if (button) button.textContent = takeWords();
   document.getElementById("says").textContent = picture && !old() ? by(picture.commander) : "";
   const log = picture && picture.recording;
   const record = document.getElementById("record"), mine = commands() || Boolean(log);

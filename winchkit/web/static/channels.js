@@ -3,9 +3,10 @@ import { ask, attempt, el, fill, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { dots, line, plot, sorted } from "./plots.js";
 
-export const TIME = "time", MOST = 8;
-const TONES = ["with", "today", "brush", "ok", "muted", "unknown", "warn", "ink"];
-const toneOf = (i) => TONES[i % TONES.length], lower = (name) => name.replaceAll("_", " "), capital = (name) => `${name[0].toUpperCase()}${lower(name).slice(1)}`;
+// Colours of runs and of winches, each unlike the others.
+export const TONES = ["with", "today", "brush", "ok", "muted", "rose", "warn", "ink"];
+export const TIME = "time", MOST = TONES.length;
+const toneOf = (i) => TONES[i], lower = (name) => name.replaceAll("_", " "), capital = (name) => `${name[0].toUpperCase()}${lower(name).slice(1)}`;
 
 // Choice of a channel; `chosen` is called with its name.
 export const choice = (label, names, value, chosen) => el("select", { "aria-label": label, onchange: (event) => chosen(event.target.value) }, names.map((name) => el("option", { value: name, selected: name === value }, lower(name))));
@@ -22,7 +23,7 @@ export function drawLines(box, { channel, over, lines, difference }, source, not
     el("h3", { class: "row" }, title, el("span", { class: "note" }, [unit, timed ? "each run from its own start" : "", note].filter(Boolean).join(", ")), exporter(`${channel}-over-${over}`, figure)), host);
   const own = (i) => lines.flatMap((each, k) => (k === i ? each.y : each.y.map(() => null)));
   const data = timed ? uPlot.join(lines.map((each) => [each.x, each.y])) : sorted(lines.flatMap((each) => each.x), ...lines.map((_, i) => own(i))).columns;
-  const style = (i) => (timed ? line(toneOf(i), 1.4, 1, { spanGaps: true, ...(i >= MOST / 2 ? { dash: [6, 3] } : {}) }) : { paths: dots(toneOf(i), 0.5, 2), points: { show: false } });
+  const style = (i) => (timed ? line(toneOf(i), 1.4, 1, { spanGaps: true }) : { paths: dots(toneOf(i), 0.5, 2), points: { show: false } });
   plot(host, data, lines.map((_, i) => style(i)), { height: difference ? 200 : 320, xLabel: xUnit, sync: timed ? "lines" : null, names, unit, label: `${title}, ${lines.length} runs`,
     traces: timed ? [] : lines.map(({ x, y }, i) => ({ x, y, tone: toneOf(i), width: 1, timed: true })) });
   if (!difference) return;

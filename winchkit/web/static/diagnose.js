@@ -3,7 +3,7 @@ import { ask, attempt, closeDialog, dialog, download, el, filesOf, fill, icon, n
 import { channelPanel } from "./channels.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
-import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
+import { counted, ladderExporter, ladderGrid, place, presentName, reach } from "./ladder.js";
 import { morph, slideRails } from "./motion.js";
 import { newProfile } from "./profile.js";
 import { both, drawSides } from "./sides.js";
@@ -150,8 +150,8 @@ function chooseRuns() {
 }
 
 const chooseBeside = () => attempt(async () => {
-  const choices = await ask("/api/choices"), { name, added } = view.profile;
-  const versions = ["", ...added].map((effect, i) => el("option", { value: i, selected: i === Math.max(0, added.length - 1) }, i ? `${name} + ${added.slice(0, i).join(" + ")}` : `${name} as loaded`));
+  const choices = await ask("/api/choices"), { name, added, names } = view.profile;
+  const versions = ["", ...added].map((effect, i) => el("option", { value: i, selected: i === Math.max(0, added.length - 1) }, i ? `${name} + ${names.slice(0, i).join(" + ")}` : `${name} as loaded`));
   const list = el("select", { "aria-label": "Profile beside" }, el("optgroup", { label: "This profile" }, versions), el("optgroup", { label: "Others" }, choices.profiles.map((own) => el("option", {}, own))));
   const boxes = view.runs.map((run) => [run.name, el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" } })]);
   dialog("Compare with", el("label", { class: "row" }, "Profile", list),
@@ -196,7 +196,7 @@ function earlierRails() {
 
 function drawLadder() {
   const box = root.querySelector("#ladder"), own = view.diagnosis.ladder, narrow = matchMedia("(max-width: 699px)").matches;
-  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), exporter("ladder", () => ladderFigure(own, source()), false)),
+  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), ladderExporter(own, { output: shown.output, effect: shown.effect, present: presentName(view.profile) }, source)),
     narrow ? el("div", { class: "row segments" }, own.columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null,
     ladderGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
 }
@@ -319,10 +319,10 @@ async function drawTime() {
       address();
       clearTimeout(zoom.timer); zoom.timer = setTimeout(drawTime, 60);
     };
-    const marks = data.runs.slice(1).map((run) => run.at), xLabel = "time [s]";
+    const xLabel = "time [s]", marked = brushed && brushed.time;
     const figure = () => ({ title: `${data.name}: measured and predicted, and the residual`, source: source(), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
-      panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, marks, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
-        { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
+      panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, runs, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
+        { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, runs: data.runs, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }, ...(brushed ? [{ name: `marked [${data.residual_unit}]`, x: brushed.time, y: brushed.residual, tone: "brush", points: true }] : [])] }] });
     if (!view.compared) {
       fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}; not compared yet`)), legend(["edge", "measured"])), upper);
       plot(upper, [data.x, data.measured], [line("ink", 1.6, 0.7)], { height: 120, top: 22, left: 58, runs, zoom, xLabel: "s", sync: "time", names: ["measured"], unit: data.unit, label: `${data.name}, measured over time` });
@@ -331,7 +331,6 @@ async function drawTime() {
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
     plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, left: 58, runs, zoom, sync: "time", names: ["measured", "predicted"], unit: data.unit, label: `${data.name}, measured and predicted over time` });
-    const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
       { height: 188, left: 58, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", names: ["residual"], unit: data.residual_unit, label: `Residual of the ${data.name} over time` });
@@ -366,17 +365,17 @@ async function drawMultiples() {
 }
 
 function multiplesFigure(found) {
-  const name = view.diagnosis.ladder.columns.find((c) => c.output === shown.output).name, range = sym(found.residual)();
-  return { title: `Residual of the ${name.toLowerCase()} against each variable`, source: source(), across: 3, legend: [{ name: "residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
-    panels: found.panels.map((panel) => ({ title: `${panel.name}, ${Math.round(100 * panel.share)} % [${found.unit}]`, x: panel.x, xLabel: panel.label, noise: found.noise, range, logarithmic: panel.logarithmic,
-      series: [{ name: `residual [${found.unit}]`, y: found.residual, tone: "today", points: true, opacity: 0.28 }, { name: `mean [${found.unit}]`, x: panel.bins, y: panel.means, tone: "today", width: 2 }] })) };
+  const name = view.diagnosis.ladder.columns.find((c) => c.output === shown.output).name, range = sym(found.residual)(), marked = brushed && found.residual.map((value, i) => (brushed.marked.has(i) ? value : null));
+  return { title: `Residual of the ${name.toLowerCase()} [${found.unit}] against each variable`, source: source(), across: 3, legend: [{ name: "residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
+    panels: found.panels.map((panel) => ({ title: `${panel.name}, ${Math.round(100 * panel.share)} %`, x: panel.x, xLabel: panel.label, noise: found.noise, range, logarithmic: panel.logarithmic,
+      series: [{ name: `residual [${found.unit}]`, y: found.residual, tone: "today", points: true, opacity: 0.28 }, { name: `mean [${found.unit}]`, x: panel.bins, y: panel.means, tone: "today", width: 2, broken: true }, ...(marked ? [{ name: `marked [${found.unit}]`, y: marked, tone: "brush", points: true }] : [])] })) };
 }
 
 function brush(found, panel, low, high) {
   const marked = new Set();
   panel.x.forEach((x, i) => { if (x !== null && x >= low && x <= high) marked.add(i); });
   const order = [...marked].sort((a, b) => found.time[a] - found.time[b]);
-  brushed = marked.size ? { time: order.map((i) => found.time[i]), residual: order.map((i) => found.residual[i]) } : null;
+  brushed = marked.size ? { marked, time: order.map((i) => found.time[i]), residual: order.map((i) => found.residual[i]) } : null;
   const first = panels.findIndex((_, i) => found.panels[i] === panel), marks = ({ drawn, index, data }) => () => {
     drawn.setData([data[0], data[1], index.map((i) => (marked.has(i) ? found.residual[i] : null))], false);
     drawn.redraw();

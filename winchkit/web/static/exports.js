@@ -2,7 +2,7 @@
 import { el, keep } from "./page.js";
 import { freed, holds } from "./plots.js";
 
-export const LIGHT = { surface: "#FFFFFF", ink: "#12161C", ink2: "#414B58", muted: "#5F6B79", line: "#DDE2E8", edge: "#858F9C", today: "#C2500F", with: "#0B4A8A", band: "#E4E8ED", brush: "#7B2FA8", action: "#1D4F91", stop: "#C5221A", ok: "#14693A", warn: "#805300", unknown: "#6A3A96" };
+export const LIGHT = { surface: "#FFFFFF", ink: "#12161C", ink2: "#414B58", muted: "#5F6B79", line: "#DDE2E8", edge: "#858F9C", today: "#C2500F", with: "#0B4A8A", band: "#E4E8ED", brush: "#7B2FA8", rose: "#D6246E", tint: "#E9F1FB", action: "#1D4F91", stop: "#C5221A", ok: "#14693A", warn: "#805300", unknown: "#6A3A96" };
 
 // `columns` are pairs of a name and its values; `source` says profile and runs when it is asked.
 export function drawingExporter(name, title, node, source, columns) {

@@ -1,19 +1,18 @@
 // Exports of plots: panels of curves and points as CSV, SVG and PNG at twice the size, light theme.
-// A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and
-// marks, or names of rows in place of a vertical axis.
+// A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and runs.
 import { number, svg } from "./page.js";
 import { menu, saved } from "./exports.js";
-import { heldRange } from "./plots.js";
+import { runText, seenRange, widest } from "./plots.js";
 
 const GAP = 30, BOTTOM = 40, TOP = 26;
 
-// The panels of a figure are drawn in the range that the plots of its section keep.
-export function exporter(name, describe, axes = true) {
+// The panels of a figure are drawn in the range that the plots of its section show.
+export function exporter(name, describe) {
   return menu(name, (kind, plots) => {
     const figure = describe();
-    figure.panels.forEach((panel, i) => { if (plots[i]) panel.range = heldRange(plots[i]) || panel.range; });
+    figure.panels.forEach((panel, i) => { panel.range = seenRange(plots[i]) || panel.range; });
     save(kind, name, figure);
-  }, axes);
+  }, true);
 }
 
 function save(kind, name, figure) {
@@ -45,29 +44,32 @@ function drawing(figure) {
 }
 
 function drawnPanel(panel, w, h) {
-  const LEFT = panel.rows ? 150 : 56;
+  const LEFT = 56, wide = (text) => 7 * text.length;
   const x = (value) => (panel.logarithmic ? Math.log10(value) : value);
   const [x0, x1] = ends(finite(panel.series.flatMap((own) => finite(own.x || panel.x)).map(x)));
   const [y0, y1] = panel.range || ends([...panel.series.flatMap((own) => finite(own.y)), ...(panel.noise ? [panel.noise, -panel.noise] : [])]);
   const px = (value) => LEFT + ((x(value) - x0) / (x1 - x0 || 1)) * (w - LEFT - GAP), py = (value) => h - BOTTOM - ((Math.max(y0, Math.min(y1, value)) - y0) / (y1 - y0 || 1)) * (h - TOP - BOTTOM);
-  const parts = [svg("text", { x: LEFT, y: 14, "font-weight": 600, fill: "var(--ink)" }, panel.title.length > 0.13 * (w - LEFT) ? `${panel.title.slice(0, Math.floor(0.13 * (w - LEFT)) - 1)}…` : panel.title)];
+  const parts = [svg("text", { x: Math.max(0, Math.min(LEFT, w - wide(panel.title))), y: 12, "font-weight": 600, fill: "var(--ink)" }, panel.title)];
   if (panel.noise) parts.push(svg("rect", { x: LEFT, y: py(panel.noise), width: w - LEFT - GAP, height: Math.max(0, py(-panel.noise) - py(panel.noise)), fill: "var(--band)", stroke: "var(--edge)", "stroke-dasharray": "3 3" }));
-  for (const [i, name] of (panel.rows || []).entries()) parts.push(svg("text", { x: LEFT - 10, y: py(panel.rows.length - i) + 4, "text-anchor": "end", fill: "var(--ink2)" }, name.length > 20 ? `${name.slice(0, 19)}…` : name));
-  for (const value of panel.rows ? [] : steps(y0, y1)) parts.push(svg("line", { x1: LEFT, x2: w - GAP, y1: py(value), y2: py(value), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: py(value) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(value)));
+  for (const value of steps(y0, y1)) parts.push(svg("line", { x1: LEFT, x2: w - GAP, y1: py(value), y2: py(value), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: py(value) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(value)));
   for (const value of steps(x0, x1)) parts.push(svg("text", { x: LEFT + ((value - x0) / (x1 - x0 || 1)) * (w - LEFT - GAP), y: h - BOTTOM + 16, "text-anchor": "middle", fill: "var(--muted)" }, number(panel.logarithmic ? 10 ** value : value, 3)));
-  parts.push(svg("text", { x: (w + LEFT - GAP) / 2, y: h - BOTTOM + 32, "text-anchor": "middle", fill: "var(--muted)" }, panel.xLabel));
-  for (const mark of panel.marks || []) parts.push(svg("line", { x1: px(mark), x2: px(mark), y1: TOP, y2: h - BOTTOM, stroke: "var(--edge)", "stroke-dasharray": "2 3" }));
-  for (const own of panel.series) parts.push(drawnSeries(own, own.x || panel.x, px, py));
+  parts.push(svg("text", { x: (w + LEFT - GAP) / 2, y: h - BOTTOM + 32, "text-anchor": "middle", fill: "var(--muted)" }, wide(panel.xLabel) > w ? panel.xLabel.replace(/;.*(?= \[)/, "") : panel.xLabel));
+  for (const [i, run] of (panel.runs || []).entries()) {
+    const [from, to] = [run.at, panel.runs[i + 1] ? panel.runs[i + 1].at : x1].map((value) => Math.max(px(x0), Math.min(px(x1), px(value)))), words = runText(run, to - from, wide);
+    if (run.at >= x0 && run.at <= x1) parts.push(svg("line", { x1: from, x2: from, y1: TOP, y2: h - BOTTOM, stroke: "var(--edge)", "stroke-dasharray": "2 3" }));
+    if (words) parts.push(svg("text", { x: from + 3, y: TOP - 1, fill: "var(--muted)" }, words));
+  }
+  for (const own of panel.series) parts.push(drawnSeries(own, own.x || panel.x, px, py, own.broken && !panel.logarithmic ? widest(own.x) : Infinity));
   return parts;
 }
 
-function drawnSeries(own, xs, px, py) {
+function drawnSeries(own, xs, px, py, most) {
   let path = "", pen = false;
   xs.forEach((value, i) => {
     const y = own.y[i];
     if (y === null || y === undefined || value === null || !Number.isFinite(value)) { pen = false; return; }
     const at = `${px(value).toFixed(1)} ${py(y).toFixed(1)}`;
-    path += own.points ? `M${at}h0` : `${pen ? "L" : "M"}${at}`;
+    path += own.points ? `M${at}h0` : `${pen && value - xs[i - 1] <= most ? "L" : "M"}${at}`;
     pen = true;
   });
   return svg("path", { d: path, fill: "none", stroke: `var(--${own.tone})`, "stroke-width": own.points ? 2.5 : own.width || 1.4, "stroke-linecap": "round", opacity: own.opacity || 1 });

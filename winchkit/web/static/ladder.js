@@ -1,4 +1,5 @@
 // The ladder: held-out error ÷ noise floor of each model, one column per output.
+import { drawingExporter } from "./exports.js";
 import { el, svg } from "./page.js";
 
 const LOG = (ratio) => Math.log2(Math.max(ratio, 1));
@@ -41,14 +42,32 @@ export function ladderGrid({ columns, rows }, { output, effect, only, most, pres
   return grid;
 }
 
-export function ladderFigure({ columns, rows }, source) {
-  const today = rows.find((row) => row.kind === "today"), ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
-  const end = (row, c) => (row.kind === "candidate" && ratio(row, c) ? ratio(today, c) : ratio(row, c));
-  return { title: "Held-out error of each candidate", source, height: 80 + 22 * rows.length, legend: [{ name: "present profile", tone: "today" }, { name: "with the candidate", tone: "with" }, { name: "noise floor", tone: "edge" }],
-    panels: columns.map((c) => ({ title: c.name, xLabel: "error ÷ noise floor", range: [0.5, rows.length + 0.5], rows: rows.map((row) => row.label), marks: [1],
-      series: rows.map((row, i) => ({ name: `row of ${row.label}`, x: [end(row, c), ratio(row, c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: row.kind === "candidate" ? 4 : 9 })) })) };
+const NAMES = 270, WIDTH = 960, TOP = 28, ROW = 27;
+
+// Exports of the ladder as it is seen; in the table the errors of every model.
+export function ladderExporter({ columns, rows }, { output, effect, present }, source) {
+  const most = reach({ columns, rows }), today = rows.find((row) => row.kind === "today"), share = (WIDTH - NAMES) / (columns.length + 1), axis = TOP + ROW * rows.length, named = (row) => (row.kind === "today" && present ? present : row.label);
+  const words = (text, x, y, more = {}) => svg("text", { x, y, fill: "var(--ink2)", ...more }, text), end = { "text-anchor": "end" }, inner = (node, x, y, w, height) => { for (const [name, value] of Object.entries({ x, y, width: w, height, overflow: "visible" })) node.setAttribute(name, value); return node; };
+  const parts = [svg("defs", {}, svg("pattern", { id: "floor", width: 6, height: 6, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("rect", { width: 1.2, height: 6, fill: "var(--edge)" })))];
+  rows.forEach((row, i) => {
+    const chosen = row.kind === "candidate" && row.effect === effect, y = TOP + ROW * i + 18;
+    if (chosen) parts.push(svg("rect", { x: 0, y: TOP + ROW * i, width: WIDTH, height: ROW, fill: "var(--tint)" }));
+    parts.push(words(named(row), 0, y, chosen || row === today ? { "font-weight": 600 } : {}), row.equal ? words("=", NAMES - 12, y, end) : null);
+  });
+  let left = NAMES;
+  for (const c of columns) {
+    const wide = c.output === output ? 2 * share : share, right = left + wide - 8;
+    parts.push(words(c.name, left + 8, 16, { "font-weight": 600 }), words(c.unit, right, 16, end), inner(scale(most), left, axis, wide - 60, ROW));
+    rows.forEach((row, i) => {
+      const cell = row.cells[c.output], before = rows[i - 1] && rows[i - 1].kind === "history" ? rows[i - 1].cells[c.output] : null;
+      parts.push(inner(rung(row, cell, today.cells[c.output], most, c.output, row.kind === "candidate" && row.effect === effect, before), left, TOP + ROW * i, wide - 60, ROW), words(cell ? cell.text : "–", right, TOP + ROW * i + 18, end));
+    });
+    left += wide;
+  }
+  parts.push(words("error ÷ noise floor", 0, axis + 17));
+  const drawn = svg("svg", { viewBox: `0 0 ${WIDTH} ${axis + ROW}`, "font-size": 12 }, parts);
+  return drawingExporter("ladder", "Held-out error of each candidate", drawn, source, [["model", rows.map(named)], ["effect", rows.map((row) => row.effect || "")], ...columns.map((c) => [`${c.name} [${c.unit}]`, rows.map((row) => (row.cells[c.output] ? row.cells[c.output].text : ""))])]);
 }
-const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
 
 // `before` is the error of the row above where that is an earlier profile.
 function rung(row, cell, now, most, output, picked, before) {

@@ -62,13 +62,21 @@ function marks(runs) {
     runs.forEach((run, i) => {
       const x = u.valToPos(run.at, "x", true), from = Math.max(x, bbox.left), to = i + 1 < runs.length ? Math.min(right, u.valToPos(runs[i + 1].at, "x", true)) : right;
       if (x >= bbox.left - 1 && x <= right) { ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke(); }
-      // Where the name has no room its load stays.
-      const words = run.labelled ? [run.name, (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0]].find((text) => text && ctx.measureText(text).width + 2 * gap < to - from) : null;
+      const words = runText(run, to - from - 2 * gap, (text) => ctx.measureText(text).width);
       if (words) ctx.fillText(words, from + gap, bbox.top - 5 * devicePixelRatio);
     });
     ctx.restore();
   };
 }
+
+// The largest step between two bins over which a line of means is drawn.
+export function widest(x) {
+  const steps = x.slice(1).map((value, i) => value - x[i]).sort((a, b) => a - b);
+  return 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
+}
+
+// The name of a labelled run where it has room, else its load.
+export const runText = (run, room, width) => run.labelled && [run.name, (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0]].find((text) => text && width(text) < room);
 
 // Means over bins as lines, broken where no sample lies between two bins; `timed` ones, in the order
 // of time, are broken where a value is missing.
@@ -78,14 +86,14 @@ function traced(traces) {
     ctx.save();
     ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
     for (const { x, y, tone, width, timed } of traces) {
-      const steps = x.slice(1).map((value, i) => value - x[i]).sort((a, b) => a - b), wide = 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
+      const wide = timed || u.scales.x.distr === 3 ? Infinity : widest(x);
       ctx.strokeStyle = colour(tone); ctx.lineWidth = width * devicePixelRatio; ctx.lineJoin = "round";
       ctx.beginPath();
       let pen = false;
       x.forEach((value, i) => {
         if (value === null || y[i] === null) { pen = false; return; }
         const at = [u.valToPos(value, "x", true), u.valToPos(y[i], "y", true)];
-        if (!pen || (!timed && u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+        if (!pen || value - x[i - 1] > wide) ctx.moveTo(...at); else ctx.lineTo(...at);
         pen = true;
       });
       ctx.stroke();
@@ -112,7 +120,8 @@ export function dots(tone, alpha, size = 3) {
 // y ranges that are kept, by the plot's label: they outlive its drawing.
 const held = new Map(), drawnIn = new WeakMap();
 const labelOf = (host) => host.getAttribute("aria-label");
-export const heldRange = (host) => held.get(labelOf(host)) || null;
+// The y range that a plot shows.
+export function seenRange(host) { const u = host && drawnIn.get(host); return u ? [u.scales.y.min, u.scales.y.max] : null; }
 export function holds(host) { const { min, max } = drawnIn.get(host).scales.y; held.set(labelOf(host), [min, max]); }
 export function freed(host) { held.delete(labelOf(host)); const u = drawnIn.get(host), { min, max } = u.scales.x; u.setData(u.data, false); u.setScale("x", { min, max }); }
 

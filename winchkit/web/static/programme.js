@@ -1,4 +1,5 @@
 // The programme runner: choose one, see what it would do, hold a button to start it; its progress.
+import { TONES } from "./channels.js";
 import { ask, attempt, closeDialog, dialog, el, fill, number, svg } from "./page.js";
 
 const HOLD = 800, SIGN = 100;
@@ -54,8 +55,8 @@ function curves(plan) {
   for (let k = 0; k <= 4; k++) { const v = low + (k * (high - low)) / 4; parts.push(svg("line", { x1: left, x2: right, y1: y(v), y2: y(v), stroke: "var(--line)" }), svg("text", { x: left - 6, y: y(v) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(v, 3))); }
   for (let k = 0; k <= 4; k++) parts.push(svg("text", { x: x((plan.duration * k) / 4), y: bottom + 18, "text-anchor": "middle", fill: "var(--muted)" }, `${number((plan.duration * k) / 4, 3)}${k === 4 ? " s" : ""}`));
   for (const [time] of plan.asks) parts.push(svg("line", { x1: x(time), x2: x(time), y1: 12, y2: bottom, stroke: "var(--edge)", "stroke-dasharray": "2 3" }), svg("text", { x: x(time) + 3, y: 12, fill: "var(--muted)" }, "?"));
-  const tones = ["with", "today", "unknown", "ok", "ink", "warn", "brush", "muted"], same = names.every((name) => plan.curves[name].every((v, i) => v === plan.curves[names[0]][i]));
-  (same ? names.slice(0, 1) : names).forEach((name, i) => parts.push(svg("path", { d: plan.time.map((t, k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(plan.curves[name][k]).toFixed(1)}`).join(""), fill: "none", stroke: `var(--${tones[i % 8]})`, "stroke-width": 1.8 }), svg("text", { x: right + 6, y: same ? y(plan.curves[name].at(-1)) + 4 : 24 + 15 * i, fill: `var(--${tones[i % 8]})` }, same && names.length > 1 ? "all winches" : name)));
+  const same = names.every((name) => plan.curves[name].every((v, i) => v === plan.curves[names[0]][i]));
+  (same ? names.slice(0, 1) : names).forEach((name, i) => parts.push(svg("path", { d: plan.time.map((t, k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(plan.curves[name][k]).toFixed(1)}`).join(""), fill: "none", stroke: `var(--${TONES[i % TONES.length]})`, "stroke-width": 1.8 }), svg("text", { x: right + 6, y: same ? y(plan.curves[name].at(-1)) + 4 : 24 + 15 * i, fill: `var(--${TONES[i % TONES.length]})` }, same && names.length > 1 ? "all winches" : name)));
   return svg("svg", { viewBox: `0 0 ${width} ${height}`, width: "100%", "font-size": 12, role: "img", "aria-label": `${plan.name}: ${names.join(", ")} in m over ${number(plan.duration, 3)} s` }, parts, svg("text", { x: 0, y: 12, fill: "var(--muted)" }, "m"));
 }
 

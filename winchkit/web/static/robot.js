@@ -218,7 +218,7 @@ const AXES = ["x", "y", "z"], CHANGES = [-50, -10, -1, 1, 10, 50], SPEED = 0.05;
 function platform() {
   if (!now || !bench) return null;
   const step = (axis, mm) => el("button", { onclick: () => bench.step(axis, mm / 1000, SPEED), "aria-label": `${axis} ${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm` }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
-  return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note offers" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, "watching: start with --allow-motion to move")),
+  return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note offers" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, bench.watches)),
     el("div", { class: "live three", id: "position" }), el("h2", {}, "Force of each cable"), el("div", { id: "forces" }),
     view.lines.length < 6 ? el("p", { class: "note" }, `No steps: ${view.lines.length} cables do not determine the rotation of the platform; a move along a path needs at least 6.`) : el("fieldset", { class: "steps offers" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
 }
@@ -228,7 +228,7 @@ function drawPlatform() {
   if (!box || !now || at - drawnAt < 240) return;
   drawnAt = at;
   const off = !bench.commands() || bench.tripped(), take = box.querySelector("#take");
-  if (take) { take.textContent = bench.commands() ? "Release command" : "Request command"; take.disabled = bench.taken(); }
+  if (take) take.textContent = bench.words();
   for (const button of box.querySelectorAll(".steps button")) button.disabled = off;
   fill(box.querySelector("#position"), AXES.map((axis, i) => el("div", {}, el("span", { class: "note" }, axis, bench.old() ? ` · ${bench.ago()}` : ""), el("div", { class: "value" }, (now.position[i] * 1e3).toFixed(1).replace("-", "−"), el("small", {}, "mm")))));
   const most = Math.max(shown.limits[1] * 1.1, ...now.tension.map((v) => v ?? 0)), share = (v) => `${Math.max(0, Math.min(100, (v / most) * 100))}%`;

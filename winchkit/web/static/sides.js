@@ -7,7 +7,7 @@ import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 let span = null;
 
 const sidesOf = (view) => [view, view.beside];
-const profileOf = ({ profile }) => [profile.name, ...profile.added].join(" + ");
+const profileOf = ({ profile }) => [profile.name, ...profile.names].join(" + ");
 const usedOf = ({ runs }) => runs.filter((run) => run.used);
 
 // Outputs that both sides have.
@@ -84,12 +84,12 @@ async function drawTimes(view, output, boxes) {
       clearTimeout(zoom.timer); zoom.timer = setTimeout(() => drawTimes(view, output, boxes), 60);
     };
     found.forEach((data, i) => {
-      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = tones(view, output)[i], label = `${"AB"[i]}: ${data.name}`;
+      const [upper, lower] = [el("div", { class: "plot" }), el("div", { class: "plot" })], side = sidesOf(view)[i], tone = tones(view, output)[i], label = `${"AB"[i]}: ${data.name}`, runs = data.runs.map((run) => ({ ...run, labelled: true }));
       const figure = () => ({ title: `${label}, measured and predicted, and the residual`, source: source(side), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone }, { name: "noise floor ±1σ", tone: "edge" }],
-        panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
-          { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
+        panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", runs, range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
+          { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", runs: data.runs, range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, label, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], [tone, "predicted, residual"], ["band", "noise ±1σ", true]), exporter(`${output}-over-time-${"ab"[i]}`, figure)), upper, lower);
-      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, left: 58, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", names: ["measured", "predicted"], unit: data.unit, label: `${label}, measured and predicted over time` });
+      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, left: 58, runs, zoom, xRange, range: () => signal, sync: "sides", names: ["measured", "predicted"], unit: data.unit, label: `${label}, measured and predicted over time` });
       plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, left: 58, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", names: ["residual"], unit: data.residual_unit, label: `${label}, residual over time` });
     });
   });

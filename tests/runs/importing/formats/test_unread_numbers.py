@@ -19,3 +19,10 @@ def test_a_torque_that_cannot_be_read_is_reported(cell: str, tmp_path: Path) -> 
     used = {item.channel for item in guess.used}
     told = [note for note in guess.notes if "'torque' is named like motor_torque" in note]
     assert bool(told) == ("motor_torque" not in used)
+
+
+def test_the_cell_that_is_no_number_is_the_one_that_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time [s],tension [N]\n0,1\n1,x\n2,3\n")
+    (note,) = guess_columns(read_table(str(path))).notes
+    assert note.endswith("such as 'x'")

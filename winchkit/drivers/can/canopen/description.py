@@ -209,9 +209,9 @@ def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
     if lost is not None:
         row = OPTIONS["connection_lost"]
         if lost.writable:
-            return "reacts as set in 6007h (3 quick stop, 1 fault)", ("6007h",)
+            return "it reacts as set in 6007h (3 quick stop, 1 fault)", ("6007h",)
         words = row.meanings.get(lost.default or 0, "of the maker's own")
-        return f"reacts as fixed in 6007h: {lost.default} ({words})", ("6007h",)
+        return f"it reacts as fixed in 6007h: {lost.default} ({words})", ("6007h",)
     if declared(dictionary, 0x1029, 1) is not None:
         return (
             "it leaves the state operational (1029h:1), there is no 6007h: whether the motor "
