@@ -137,7 +137,9 @@ def _oscillates(spikes: NDArray[np.bool_]) -> NDArray[np.bool_]:
     found = np.zeros_like(spikes)
     for period in _PERIODS:
         middle = np.zeros_like(spikes)
-        middle[period:-period] = spikes[2 * period :] & spikes[period:-period] & spikes[: -2 * period]
+        middle[period:-period] = (
+            spikes[2 * period :] & spikes[period:-period] & spikes[: -2 * period]
+        )
         found |= middle
         found[period:] |= middle[:-period]
         found[:-period] |= middle[period:]

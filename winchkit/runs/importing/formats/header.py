@@ -108,7 +108,10 @@ def _of_labview(rows: Sequence[Row], width: int, decimal: str) -> Header | None:
     is_clock = "Time" in segment.get("X_Dimension", [])
     times = [is_clock and name == _X_VALUE for name, _ in names]
     given = _padded(segment.get("Y_Unit_Label", []), width)
-    units = [own or (unit if read_unit(unit) else "") for (_, own), unit in zip(names, given, strict=True)]
+    units = [
+        own or (unit if read_unit(unit) else "")
+        for (_, own), unit in zip(names, given, strict=True)
+    ]
     steps = {cell for cell in segment.get("Delta_X", [])[1:] if cell}
     step = number(steps.pop(), decimal) if len(steps) == 1 else None
     return Header(

@@ -22,7 +22,13 @@ from winchkit.runs.importing.formats.dialect import (
     split_line,
     whole_lines,
 )
-from winchkit.runs.importing.formats.header import END_OF_HEADER, Header, Row, keyed_width, read_header
+from winchkit.runs.importing.formats.header import (
+    END_OF_HEADER,
+    Header,
+    Row,
+    keyed_width,
+    read_header,
+)
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
@@ -36,6 +42,8 @@ _HEAD = 60
 """Lines in which a header ends."""
 _COMPARED = 20
 """Rows whose last numbers are compared with that of a row without a line end."""
+_SUMMARY = 12
+"""Most rows of a summary: mean, extremes, deviation and their units."""
 _LEFT_OUT = "The row is left out"
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
@@ -283,10 +291,26 @@ def _remark(cells: Sequence[str], dialect: Dialect) -> int:
     return len(cells) - 1 - places[-1] if places else 0
 
 
-def _not_data(cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last: bool) -> str:
+def _start_of_summary(rows: Sequence[Row], first: int, dialect: Dialect) -> int:
+    """Index behind the last row of numbers, before a few rows with a title: ``Mean;1,2;3,4``."""
+    end = len(rows)
+    if not rows[first][1][0] or _has_title(rows[first][1], dialect):
+        return end
+    for index in range(end - 1, max(first, end - _SUMMARY - 1), -1):
+        cells = rows[index][1]
+        if any(cells) and not _has_title(cells, dialect):
+            return index + 1
+    return end
+
+
+def _not_data(
+    cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last: bool, is_summary: bool
+) -> str:
     """What a line between the rows of numbers is; empty for a row with a fault."""
     if is_title:
         return "repeated lines of the header"
+    if is_summary and any(cells[1:]):
+        return "rows of a summary at the end, with a title in place of the first number,"
     if cells[0].startswith(("#", "%")) or cells[0].upper() in {"EOF", "END"}:
         return "comments between the rows"
     # The last line may be cut off.
@@ -329,7 +353,8 @@ def _kept(
     is_blank, least = dialect.delimiter == BLANKS, width - _remark(rows[first][1][:width], dialect)
     last = next((n for n, cells in reversed(rows) if any(cells)), 0)
     titles = {row[0] for row in header.rows}
-    for line, given in islice(rows, first, None):
+    end = _start_of_summary(rows, first, dialect)
+    for index, (line, given) in enumerate(islice(rows, first, None), start=first):
         if not any(given):
             continue
         cells = given[:-1] if len(given) == width + 1 and not given[-1] else given
@@ -338,13 +363,16 @@ def _kept(
         if is_blank and len(cells) != width and len(cells) - _remark(cells, dialect) == least:
             cells, remarks = [*cells, *[""] * width][:width], remarks + 1
         is_title = cells[0] in titles and tuple(cells) in header.rows
-        if len(cells) == width and not is_title:
+        is_summary = index >= end and number(cells[0], dialect.decimal) is None
+        if len(cells) == width and not is_title and not is_summary:
             if line == last and not is_ended and (doubt := _cut_off(cells, rows, dialect)):
                 found.notes.append(doubt)
                 if doubt.endswith(_LEFT_OUT):
                     continue
             found.add(line, cells)
-        elif kind := _not_data(cells, dialect, is_title=is_title, is_last=line == last):
+        elif kind := _not_data(
+            cells, dialect, is_title=is_title, is_last=line == last, is_summary=is_summary
+        ):
             left_out[kind] += 1
         elif line == last and len(cells) < width and not is_ended:
             found.notes.append(
