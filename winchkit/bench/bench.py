@@ -256,7 +256,9 @@ class Bench(BenchConnection):
         """
         self.loop.require_other_thread("reset")
         by = self.commanders.actor.name
-        ended = [f"winch {name}: a motion under way" for name in self.winch if self.winch[name].moving]
+        ended = [
+            f"winch {name}: a motion under way" for name in self.winch if self.winch[name].moving
+        ]
         for winch in self.winch.values():
             winch.end_held(f"{by} reset the bench; give a new command")
         try:

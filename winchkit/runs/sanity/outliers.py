@@ -50,10 +50,10 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     two at a distance of two samples deviates as much, it is left out: of two spikes with one sample
     between them, neither hides the other. The search is repeated without the spikes that were
     found. A peak that lasts two samples, a step, or an oscillation is none; an oscillation at a
-    quarter or a third of the rate has three or more of them at equal distances. The first and the last
-    sample have neighbours on one side: they are spikes where the step to the next sample exceeds
-    twelve standard deviations and three times the largest other step, and the next four samples
-    agree.
+    quarter or a third of the rate has three or more of them at equal distances. The first and the
+    last sample have neighbours on one side: they are spikes where the step to the next sample
+    exceeds twelve standard deviations and three times the largest other step, and the next four
+    samples agree.
     """
     spikes, _, ends = _spikes(values, resolution(values))
     return spikes | ends

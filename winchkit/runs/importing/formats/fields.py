@@ -6,6 +6,7 @@ Elements of an array are named by their index, joints of a JointState by their n
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -131,7 +132,9 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
     if sum(bool(_labelled(lines[number])) for number in sample) < _SHARE * len(sample) / 2:
         return None
     read = {number: _labelled(lines[number]) for number in filled}
-    rows = {number: found for number, found in read.items() if found}
+    # A line with other names than all others was interrupted.
+    counts = Counter(tuple(found) for found in read.values())
+    rows = {number: found for number, found in read.items() if found and counts[tuple(found)] > 1}
     if len(rows) < max(_FEWEST, _SHARE * len(filled)):
         return None
     names = dict.fromkeys(name for found in rows.values() for name in found)
