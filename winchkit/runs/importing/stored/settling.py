@@ -99,6 +99,8 @@ def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
         f"'{name}' jumps {wrap.count} times by about {wrap.modulus:.4g}, as numbers do that "
         "wrap there; its other steps do not say so for certain"
     )
+    if wrap.modulus not in {*usual, *rare}:
+        text += "; this number is an estimate: that of the counter or encoder is exact"
     options = (f'--modulo "{name}={wrap.modulus:.12g}"', f'--modulo "{name}=0"')
     work.questions.append(Question(text, options, "modulo"))
     return True
