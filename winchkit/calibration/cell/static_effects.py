@@ -2,13 +2,14 @@
 
 The difference of reading and load is a linear model of up to seven columns; all subsets whose terms
 are significant (t test, 5 %) are fitted by least squares, and that of least BIC is kept. Its terms
-are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and
-``cell-hysteresis``, so that the values go into a profile, and three that depend on the order of the
-loads: a zero return (all readings of a series after its largest load), a zero shift (all readings
-after the first largest load) and a loop that closes at both ends (4h x (1 − x) of the reading on
-the way down, x the share of the largest load: the parabolas of Rayleigh's law). Readings in a unit of their own (counts, mV/V) have their
-zero and span by definition; the other terms are then in newtons of their own span. Series that
-repeat each other give the pure error, with which the lack of fit of the kept model is tested.
+are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and ``cell-
+hysteresis``, so that the values go into a profile, and three that depend on the order of the loads:
+a zero return (all readings of a series after its largest load), a zero shift (all readings after
+the first largest load) and a loop that closes at both ends (4h x (1 − x) of the reading on the way
+down, x the share of the largest load: the parabolas of Rayleigh's law). Readings in a unit of their
+own (counts, mV/V) have their zero and span by definition; the other terms are then in newtons of
+their own span. Series that repeat each other give the pure error, with which the lack of fit of the
+kept model is tested.
 
 References
 ----------

@@ -208,3 +208,21 @@ def test_an_angle_that_may_be_in_degrees_is_asked_in_every_format(
         path.write_text(json.dumps({"t": [*TIME], "theta": [*DEG], "tau": [*TORQUE]}))
     (question,) = guess_columns(read_table(path)).questions
     assert "may be deg or rad" in question.text
+
+
+@pytest.mark.parametrize("is_doubtful", [True, False])
+def test_quoted_commas_that_may_separate_thousands_are_refused(
+    is_doubtful: bool, tmp_path: Path
+) -> None:
+    """Beside a number below 1 they are decimals."""
+    path = tmp_path / "log.csv"
+    angle = 5 - ANGLE if is_doubtful else ANGLE
+    cells = [f"{value:.3f}".replace(".", ",") for value in angle]
+    rows = [f'{round(1e3 * t)},"{c}",{k % 9}' for k, (t, c) in
+            enumerate(zip(TIME, cells, strict=True))]  # fmt: skip
+    path.write_text("\n".join(["time [ms],angle [rad],torque [N m]", *rows]) + "\n")
+    if is_doubtful:
+        with pytest.raises(RunError, match="may have a separator of thousands"):
+            imported(path)
+    else:
+        assert imported(path)["motor_angle"] == pytest.approx(ANGLE, abs=6e-4)

@@ -18,6 +18,7 @@ from winchkit.runs.importing.formats.dialect import (
     FEWEST,
     Dialect,
     decode,
+    doubt_of_commas,
     find_dialect,
     split_line,
     whole_lines,
@@ -61,6 +62,8 @@ def read_text_table(path: str, data: bytes) -> ColumnTable:
         shown = next((line for line in lines if line.strip()), "")[:60]
         message = f"has no rows of numbers; its first line is {shown!r}"
         raise RunError(Fault(message, path))
+    if doubt := doubt_of_commas(lines, dialect):
+        raise RunError(Fault(doubt, path))
     end = _end_of_header(lines)
     names = next((n for n in range(end, len(lines)) if lines[n].strip()), end)
     # LabVIEW has a column of comments, of which rows without one have no cell.
