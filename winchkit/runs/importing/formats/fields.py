@@ -30,6 +30,8 @@ _SHARE = 0.8
 """Least share of the lines that label each value; others are messages of the program."""
 _FEWEST = 10
 """Least number of such lines."""
+_LOOKED = 4000
+"""Bytes in the middle of a file that have a mark for each line."""
 _SAMPLED = 200
 """Lines of a long file that are read first."""
 _DEEPEST = 6
@@ -126,6 +128,9 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
     another text. Raises RunError for a binary file. A line that a message or a lost character
     interrupts is left out with a note.
     """
+    middle = data[len(data) // 2 :][:_LOOKED]
+    if middle.count(b":") + middle.count(b"=") < middle.count(b"\n"):
+        return None
     lines, _ = decode(data, path)
     filled = [number for number, line in enumerate(lines) if line.strip()]
     sample = filled[:: 1 + len(filled) // _SAMPLED]
