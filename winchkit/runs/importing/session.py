@@ -170,7 +170,8 @@ def _without_use(
     for name, unit in _CONSTANTS.items():
         if getattr(answers, name) is None:
             continue
-        without = replace(answers, **{name: None})
+        nothing: dict[str, Any] = {name: None}
+        without = replace(answers, **nothing)
         others = [
             guess_columns(guess.file, answers_of(guess.file, tables, without)) for guess in guesses
         ]

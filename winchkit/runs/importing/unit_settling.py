@@ -31,7 +31,7 @@ from winchkit.units import GRAVITY, UNITS
 _TURN = 2 * math.pi
 _AXES = (set(POSITION), set(ANGLES))
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
-_SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
+_SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP", "MCAP, JSON")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta", "rvec"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.runs.importing.formats.dialect import decode
+from winchkit.runs.importing.formats.stamps import epoch_unit
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.units.spelling import read_unit, split_unit
@@ -34,6 +35,7 @@ _LOOKED = 4000
 """Bytes in the middle of a file that have a mark for each line."""
 _SAMPLED = 200
 """Lines of a long file that are read first."""
+_NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 1000, "ns": 1}
 _DEEPEST = 6
 """Nesting of tables in tables that is read; recordings have two or three levels."""
 
@@ -58,6 +60,9 @@ def stamp_of(value: Any) -> int | None:
     for part in () if header is not None else map(str, _keys(value)):
         header = header or _field(_field(value, part), "header")
     stamp = _field(header, "stamp") or _field(value, "timestamp") or _field(value, "stamp")
+    if isinstance(stamp, int | float):
+        epoch = epoch_unit(np.array([stamp], dtype=np.float64))
+        return None if epoch is None else round(stamp * _NANOSECONDS.get(epoch, 0)) or None
     seconds = _field(stamp, "sec")
     parts = [_field(stamp, name) for name in ("nanosec", "nsec")]
     fraction = next((part for part in parts if part is not None), None)

@@ -65,8 +65,8 @@ def read_mat(path: str, data: bytes) -> ColumnTable:
             kind = _first(value, "s2" if own else "_Class")
             notes.append(_object_note(_first(value, "s0") if own else str(name), kind))
             continue
-        for own, array, unit in _flat(name, value, 0):
-            arrays[own], units[own] = array, unit
+        for path_of, array, unit in _flat(name, value, 0):
+            arrays[path_of], units[path_of] = array, unit
     _refuse_objects(path, arrays, notes)
     return table_of_arrays(path, "MAT", arrays, units=units, notes=notes)
 
