@@ -158,15 +158,16 @@ def test_lines_that_name_each_value_are_rows(form: str, tmp_path: Path) -> None:
     right(run_of(streams_of(guess), {}))
 
 
-def test_an_interrupted_line_is_left_out_and_shifts_nothing(tmp_path: Path) -> None:
+def test_lines_that_are_interrupted_or_cut_off_are_left_out(tmp_path: Path) -> None:
     lines = [f"t_ms:{round(1e3 * t)},pos_deg:{x:.4f},tau_Nm:{m:.4f}" for t, x, m in
              zip(TIME, DEG, TORQUE, strict=True)]  # fmt: skip
     lines[80] = lines[80][:14] + lines[81]
     path = tmp_path / "serial.log"
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines)[:-3])
     run = imported(path)
-    assert run.time == pytest.approx(np.delete(TIME, 80), abs=1e-9)
-    assert run["motor_angle"] == pytest.approx(np.delete(ANGLE, 80), abs=1e-5)
+    assert "no line end and is left out" in " ".join(read_table(path).notes)
+    assert run.time == pytest.approx(np.delete(TIME, [80, 199]), abs=1e-9)
+    assert run["motor_torque"] == pytest.approx(np.delete(TORQUE, [80, 199]), abs=1e-4)
 
 
 def spreadsheet(rows: list[str]) -> str:

@@ -23,7 +23,7 @@ _LONGEST = 64
 """Most elements of an array in a message; longer ones are images and point clouds."""
 _HEADER = re.compile(r"(\w+\.)?header\.")
 _LABELLED = re.compile(
-    r"([A-Za-z_][\w ./()\[\]-]{0,60}?)\s*[:=]\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+    r"([A-Za-z_][\w ./()\[\]%°‰-]{0,60}?)\s*[:=]\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
     r"(?![\d.:])[ ]?([^\W\d][\w/]*|[°%‰][\w/]*)?(?![:=\w])[\s,;|]*"
 )
 """``pos_deg:12.3``, ``F = 60.1 N``: a name, a number, and perhaps its unit."""
@@ -147,6 +147,10 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
     rows = {number: found for number, found in read.items() if found and counts[tuple(found)] > 1}
     if len(rows) < max(_FEWEST, _SHARE * len(filled)):
         return None
+    notes = []
+    is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
+    if not is_ended and rows.pop(filled[-1], None):
+        notes = ["the last line has no line end and is left out: is the file cut off?"]
     names = dict.fromkeys(name for found in rows.values() for name in found)
     columns = {name: [found.get(name, (np.nan, "")) for found in rows.values()] for name in names}
     arrays, units = {}, {}
@@ -156,7 +160,7 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
         plain, unit = (name, own) if own else split_unit(name)
         arrays[plain], units[plain] = np.array([value for value, _ in cells]), unit
     inner = [n for n in filled if n not in rows and min(rows) < n < max(rows)]
-    notes = [f"{len(inner)} lines of words between the rows are left out"] if inner else []
+    notes += [f"{len(inner)} lines of words between the rows are left out"] if inner else []
     table = table_of_arrays(
         path, "text, a name before each value", arrays, units=units, notes=notes
     )
