@@ -326,6 +326,11 @@ class _Writer:
         lines = [head, *(mark.join(row) for row in cells)]
         if self.chance(0.2, "lines above the header"):
             lines = ["Recorder 7", f"Exported{mark}yes", *lines]
+        if self.chance(0.05, "a summary below the rows"):
+            lines += [mark.join(["Mean", *cells[0][1:]]), mark.join(["Max", *cells[-1][1:]])]
+        elif not comma and self.chance(0.05, "a name before each value"):
+            named = [[f"{h}:{c}" for h, c in zip(heads, row, strict=True)] for row in cells]
+            lines = ["Boot of recorder 7", *(mark.join(row) for row in named)]
         if self.chance(0.08, "cut off"):
             kept = int(self.rng.integers(len(lines) // 3, len(lines)))
             last = lines[kept - 1]

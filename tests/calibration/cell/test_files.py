@@ -173,3 +173,42 @@ def test_a_calibration_in_counts_is_read_back(tmp_path: Path) -> None:
     own = replace(CALIBRATION, unit="counts", zero_return=-0.001, point=points)
     path = write_text(tmp_path / "c.toml", calibration_toml(own))
     assert read_calibration(path) == own
+
+
+@pytest.mark.parametrize(
+    ("head", "form", "encoding"),
+    [
+        ("load [kg];reading [counts];series", "{};{};1", "utf-8-sig"),
+        ("load [kg];reading [counts]", "{},0;{},5", "utf-8"),
+        ("load_kg\treading_counts", "{}\t{}", "utf-16"),
+        ("Load (kg),Reading (counts),", "{},{},", "cp1252"),
+    ],
+)
+def test_points_are_read_as_a_spreadsheet_writes_them(
+    head: str, form: str, encoding: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "points.csv"
+    lines = [head, *(form.format(k, 8000 + 2200 * k) for k in range(6))]
+    path.write_text("\r\n".join(lines) + "\r\n", encoding=encoding)
+    found = read_points(path)
+    assert found.unit == "counts"
+    half = 0.5 if ",5" in form else 0.0
+    for k, point in enumerate(found.points):
+        assert point.load == pytest.approx(9.80665 * k)
+        assert point.indicated == pytest.approx(8000 + 2200 * k + half)
+
+
+def test_a_comma_that_may_separate_thousands_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("load [kg],reading [counts]\n" + "".join(
+        f'{k},"{8 + 2 * k},{100 + k}"\n' for k in range(6)
+    ))  # fmt: skip
+    with pytest.raises(FileError, match='"8,100" may have a separator of thousands'):
+        read_points(path)
+
+
+def test_compression_goes_up_with_its_magnitude(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    loads = [0, -5, -10, -5, 0]
+    path.write_text("load [kg],reading [counts]\n" + "".join(f"{k},{9 * k}\n" for k in loads))
+    assert [point.going for point in read_points(path).points] == ["up"] * 3 + ["down"] * 2

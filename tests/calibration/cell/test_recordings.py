@@ -119,6 +119,29 @@ def test_a_stuck_stretch_and_held_words_are_distinguished(path: Path) -> None:
     assert not any("stood still" in text for text in found.remarks)
 
 
+def test_a_gap_is_no_standstill(path: Path) -> None:
+    time, value = signal()
+    time = np.where(np.arange(len(time)) < 1000, time, time + 1.5)
+    found = findings(path, time, value)
+    assert found.health.longest_still < 0.1
+    assert any("1 gap" in text for text in found.remarks)
+    assert not any("stood still" in text for text in found.remarks)
+
+
+def test_hum_above_half_the_rate_may_be_a_vibration(path: Path) -> None:
+    time, value = signal()
+    value = np.round(value + 300 * np.sin(2 * np.pi * 50 * time))
+    whole, slow = (findings(path, time[::n], value[::n]) for n in (1, 5))
+    assert any("50 Hz: check" in text for text in whole.remarks)
+    assert any("50 Hz, or a vibration of 14 Hz" in text for text in slow.remarks)
+
+
+def test_a_converter_at_its_end_is_said_to_saturate_or_to_be_stuck(path: Path) -> None:
+    time, value = signal()
+    cut = np.minimum(value + 3000 * np.sin(2 * np.pi * time / 9), 52_000)
+    assert any("at the end of their range" in text for text in findings(path, time, cut).remarks)
+
+
 def test_saturation_is_reported(path: Path) -> None:
     time, value = signal()
     swing = value + 3000 * np.sin(2 * np.pi * time / 9)

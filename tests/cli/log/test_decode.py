@@ -78,6 +78,26 @@ def test_a_trace_is_imported_as_a_run_in_si(trace: Path, tmp_path: Path) -> None
     np.testing.assert_allclose(got["motor_torque"][1:], torque[1:], atol=2e-3)
 
 
+def test_the_counter_of_a_position_wraps_at_32_bits(trace: Path, tmp_path: Path) -> None:
+    """The range of 6064h is known: nothing is asked, and the angle continues over its end."""
+    lines = []
+    for line in trace.read_text().splitlines():
+        head, mark, data = line.partition(" 181#")
+        if mark:
+            word, counts, mode = struct.unpack("<Hib", bytes.fromhex(data.split()[0]))
+            counts = (counts + 2**32 - TURN // 7) % 2**32 - 2**31
+            data = struct.pack("<Hib", word, counts, mode).hex().upper()
+        lines.append(head + mark + data)
+    path = tmp_path / "wraps.log"
+    path.write_text("\n".join(lines) + "\n")
+    result = run("import", path, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
+    assert "wraps at" in result.stderr
+    got = read_run(tmp_path / "runs" / "wraps.csv")
+    start = datetime.fromisoformat(got.metadata["start_time"]).timestamp() - 1.7e9
+    error = got["motor_angle"] - motion(start + got.time)[0]
+    np.testing.assert_allclose(error, np.median(error), atol=2 * np.pi / TURN)
+
+
 def test_several_nodes_are_winches_and_several_buses_are_refused(
     trace: Path, tmp_path: Path
 ) -> None:

@@ -13,10 +13,17 @@ from winchkit import import_runs
 from winchkit.cli import main
 from winchkit.errors import RunError, UsageError
 from winchkit.runs import read_run
-from winchkit.runs.importing.answers import Answers, read_column, read_constant, with_options
+from winchkit.runs.importing.answers import (
+    Answers,
+    read_answers,
+    read_column,
+    read_constant,
+    with_options,
+)
 from winchkit.runs.importing.clocks.joint import joined
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.session import guesses_of
 from winchkit.runs.importing.streams import Stream, Streams
 
 HEAD = "time [s],Pos [deg],M"
@@ -156,3 +163,14 @@ def test_a_unit_of_the_file_that_is_none_of_the_channel_is_a_question(
 def test_a_factor_may_stand_before_its_column() -> None:
     first, last = "motor_torque=-0.12*Iq [N m]", "motor_torque=-Iq*0.12 [N m]"
     assert read_column(first) == read_column(last)
+
+
+def test_a_constant_that_no_column_needs_is_said(tmp_path: Path) -> None:
+    notes = []
+    for unit in ("N m", "%"):
+        path = tmp_path / "a.csv"
+        path.write_text(LOG.replace(",M", f",torque [{unit}]"))
+        (guess,) = guesses_of([read_table(path)], read_answers({"rated_torque": "2.4 N m"}))
+        notes.append(" ".join(guess.notes))
+    assert "--rated-torque is not used: no column is in a share of the rated torque" in notes[0]
+    assert "is not used" not in notes[1]

@@ -140,13 +140,18 @@ def test_sixteen_files_of_one_kind_are_one_table(is_uneven: bool, tmp_path: Path
     assert shown.count("? 'q'") == 1
 
 
-def test_a_linear_axis_whose_force_is_in_a_file_of_its_own(tmp_path: Path) -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_linear_axis_whose_force_is_in_a_file_of_its_own(sign: int, tmp_path: Path) -> None:
+    """A force that is given, here with its sign, leaves the motion of the others as it is."""
     motion = write(tmp_path / "m.csv", "time [s],pos [mm],velocity [m/s]", TIME, ANGLE, TIME)
-    force = write(tmp_path / "f.csv", "time [s],Kraft [kN]", TIME, TIME)
-    code, _ = command(motion, force, "--join", "--lag", "0 s", "-o", tmp_path / "runs", "-y")
+    force = write(tmp_path / "f.csv", "time [s],Kraft [kN]", TIME, sign * TIME)
+    given = ["-c", "force=-Kraft"] if sign < 0 else []
+    join = [*given, "--join", "--lag", "0 s", "-o", tmp_path / "runs", "-y"]
+    code, _ = command(motion, force, *join)
     assert code == 0
     run = read_run(tmp_path / "runs" / "m.csv")
     assert set(run) == {"position", "velocity", "force"}
+    assert run["force"] == pytest.approx(1000 * TIME, abs=1e-6)
     assert run["position"] == pytest.approx(ANGLE / 1000, abs=1e-8)
 
 

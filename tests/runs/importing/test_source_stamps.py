@@ -108,3 +108,67 @@ def test_times_that_go_back_are_refused(stamp: Clock | None, tmp_path: Path) -> 
     guess = bag(tmp_path / "a.mcap", back, stamp, stamp)
     with pytest.raises(RunError, match="time goes back from"):
         run_of(streams_of(guess), {})
+
+
+@pytest.mark.parametrize(
+    ("head", "cells"),
+    [
+        ("%time,field.header.stamp,position,effort", "{log:d},{stamp:d},{angle:.6f},1"),
+        (
+            "log_time,header.stamp.sec,header.stamp.nanosec,position,effort",
+            "{log:d},{sec:d},{nano:d},{angle:.6f},1",
+        ),
+        ("__time,/joints/header/stamp,position,effort", "{logs:.6f},{stamps:.6f},{angle:.6f},1"),
+    ],
+)
+def test_an_exported_table_has_the_times_of_its_source(
+    head: str, cells: str, tmp_path: Path
+) -> None:
+    """rostopic echo, ROS 2 and PlotJuggler: the recorder's times are late and jitter."""
+    late = np.random.default_rng(3).uniform(0.003, 0.005, len(TIME))
+    lines = [head]
+    for time, angle, delay in zip(TIME, ANGLE, late, strict=True):
+        stamp = START * 10**9 + round(time * 1e9)
+        log = stamp + round(delay * 1e9)
+        sec, nano = divmod(stamp, 10**9)
+        fields = {"log": log, "stamp": stamp, "sec": sec, "nano": nano, "angle": angle}
+        lines.append(cells.format(**fields, logs=log / 1e9, stamps=stamp / 1e9))
+    path = tmp_path / "joints.csv"
+    path.write_text("\n".join(lines) + "\n")
+    guess = guess_columns(read_table(path))
+    (note,) = [text for text in guess.notes if "the delay of the log time is" in text]
+    assert float(note.split("log time is ")[1].split(" ms")[0]) == pytest.approx(4, abs=0.1)
+    run = run_of(streams_of(guess), {})
+    assert run.time == pytest.approx(TIME, abs=2e-6)
+
+
+def messages(path: Path, fields: Callable[[int], dict[str, object]], late: float) -> Path:
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        topic = writer.register_channel("/axis", "json", 0)
+        for k, time in enumerate(TIME):
+            logged = round((real(float(time)) + late) * 1e9)
+            writer.add_message(topic, logged, json.dumps(fields(k)).encode(), logged)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(("name", "scale"), [("timestamp", 1.0), ("stamp", 1e9), ("stamp", 1e3)])
+def test_a_number_may_be_the_stamp_of_a_message(name: str, scale: float, tmp_path: Path) -> None:
+    def fields(k: int) -> dict[str, object]:
+        stamp = (START + float(TIME[k])) * scale
+        return {name: stamp if scale == 1 else round(stamp), "position": ANGLE[k], "effort": 1.0}
+
+    guess = guess_columns(read_table(messages(tmp_path / "a.mcap", fields, 0.009)))
+    assert "the delay of the log time is 9" in " ".join(guess.notes)
+    run = run_of(streams_of(guess), {})
+    assert run.metadata["start_time"].endswith(":20.000000+00:00")
+
+
+def test_degrees_in_messages_that_are_none_of_ros_are_asked(tmp_path: Path) -> None:
+    def fields(k: int) -> dict[str, object]:
+        return {"angle": float(np.degrees(ANGLE[k] / 8)), "torque": 0.1 * k}
+
+    guess = guess_columns(read_table(messages(tmp_path / "a.mcap", fields, 0.0)))
+    assert any("may be deg or rad" in question.text for question in guess.questions)

@@ -8,7 +8,7 @@ from functools import reduce
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt
@@ -224,6 +224,8 @@ def test_the_chance_of_coincidences_is_that_of_a_sum_of_binomial_counts(
 
 
 @given(SEEDS, st.floats(5.0, 24.0), st.integers(3, 20))
+@example(seed=3, frequency=RATE / 4, periods=12).via("every second sample is an extreme")
+@example(seed=3, frequency=RATE / 4 + 0.005, periods=20).via("every second sample is an extreme")
 @settings(max_examples=40, deadline=None)
 def test_a_vibration_of_short_duration_loses_a_few_samples_at_its_ends(
     seed: int, frequency: float, periods: int

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import math
@@ -15,17 +14,26 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import path_of
-from winchkit.errors import Fault, FileError, suggest
-from winchkit.regular_file import regular
+from winchkit.errors import Fault, FileError, RunError, suggest
+from winchkit.regular_file import read_whole
 from winchkit.runs.files import write_whole
+from winchkit.runs.importing.formats.cells import number as read_number
+from winchkit.runs.importing.formats.dialect import (
+    decode,
+    doubt_of_commas,
+    find_dialect,
+    split_line,
+)
 from winchkit.runs.importing.units.known import BRIDGE, COUNTS
-from winchkit.runs.importing.units.spelling import read_unit
+from winchkit.runs.importing.units.spelling import read_unit, split_unit
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
 from winchkit.units import GRAVITY, format_quantity
 
 _DIGITS = 9
 """Significant digits: 1 mN in 1 MN is below the resolution of every indicator, so that reading back
 changes nothing."""
+_LARGEST = 10_000_000
+"""Bytes of a file of points: some hundred thousand readings."""
 _RAW = (COUNTS, BRIDGE, "voltage")
 """Dimensions of readings in a unit of their own."""
 _COLUMNS = ("load", "indicated", "std", "going", "series")
@@ -89,7 +97,7 @@ class PointFile:
 
 
 def read_points(path: str | Path) -> PointFile:
-    """Read points of a calibration from a CSV file.
+    """Read points of a calibration from a text file.
 
     Parameters
     ----------
@@ -97,7 +105,8 @@ def read_points(path: str | Path) -> PointFile:
         File with the columns ``load`` in any unit of force or mass and ``indicated`` (or
         ``reading``) in such a unit or in counts, mV/V or V (counts without a unit); optional
         ``std``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
-        follows from the order of the loads.
+        follows from the order of the loads. Separator, decimal sign and encoding follow from the
+        content.
 
     Returns
     -------
@@ -110,24 +119,30 @@ def read_points(path: str | Path) -> PointFile:
     FileError
         With every fault and its line.
     """
+    data = read_whole(path_of(path), "file of points", _LARGEST)
     try:
-        with open(path_of(path), newline="", encoding="utf-8-sig", opener=regular) as file:
-            table = csv.reader(file)
-            rows = [(table.line_num, row) for row in table if row and row[0][:1] != "#"]
-    except FileNotFoundError:
-        raise FileError(Fault("there is no such file", str(path))) from None
-    except OSError as error:
-        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileError(Fault(f"is no CSV text: {error}", str(path))) from None
+        lines, _ = decode(data, str(path))
+    except RunError as error:
+        raise FileError(error.faults) from None
+    dialect = find_dialect(lines)
+    if dialect is not None and (doubt := doubt_of_commas(lines, dialect)):
+        raise FileError(Fault(doubt, str(path)))
+    delimiter, decimal = (",", ".") if dialect is None else (dialect.delimiter, dialect.decimal)
+    rows = [
+        (number, split_line(line, delimiter))
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.startswith("#")
+    ]
     if not rows:
         raise FileError(Fault("is empty; it needs the columns load [kg], indicated [N]", str(path)))
+    if all(not row[-1] for _, row in rows):
+        rows = [(number, row[:-1]) for number, row in rows]
     columns, unit = _columns(rows[0][1], str(path), rows[0][0])
     faults: list[Fault] = []
     points: list[CalibrationPoint] = []
     for number, row in rows[1:]:
         try:
-            points.append(_read_point(row, columns, points))
+            points.append(_read_point(row, columns, points, decimal))
         except (ValueError, IndexError) as error:
             faults.append(Fault(f"cannot be read: {error}", str(path), number))
     if faults:
@@ -151,8 +166,8 @@ def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[i
     found: dict[str, tuple[int, float]] = {}
     unit = "N"
     for place, title in enumerate(header):
-        name, _, written = title.strip().partition("[")
-        name, written = name.strip().lower(), written.strip(" ]")
+        name, written = split_unit(title)
+        name = name.lower()
         key = "indicated" if name == "reading" else name
         if key not in _COLUMNS:
             shape = "; the first line names them, e.g. load [kg],reading [counts], and each other "
@@ -179,15 +194,15 @@ def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[i
 
 
 def _read_point(
-    row: list[str], columns: dict[str, tuple[int, float]], before: list[CalibrationPoint]
+    row: list[str],
+    columns: dict[str, tuple[int, float]],
+    before: list[CalibrationPoint],
+    decimal: str,
 ) -> CalibrationPoint:
     def number(key: str) -> float:
         place, factor = columns[key]
-        try:
-            value = float(row[place])
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
+        value = read_number(row[place], decimal)
+        if value is None or not math.isfinite(value):
             raise ValueError(f"{key} '{row[place]}' is no number")
         return value * factor
 
@@ -200,7 +215,9 @@ def _read_point(
             raise ValueError(f"'{going}' is neither up nor down")
     elif before and before[-1].series == series:
         last = before[-1]
-        going = last.going if load == last.load else ("up" if load > last.load else "down")
+        going = (
+            last.going if load == last.load else ("up" if abs(load) > abs(last.load) else "down")
+        )
     std = number("std") if "std" in columns else 0.0
     return CalibrationPoint(load, number("indicated"), std, going, series)
 

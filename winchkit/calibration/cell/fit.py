@@ -182,10 +182,10 @@ def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array
 
 
 def _groups(load: Array, span: float) -> list[Array]:
-    """Indices of the points at the same load, by increasing load."""
+    """Indices of the points at the same load, by increasing magnitude: compression is negative."""
     order = np.argsort(load, kind="stable")
     breaks = np.flatnonzero(np.diff(load[order]) > _SAME_LOAD * span) + 1
-    return list(np.split(order, breaks))
+    return sorted(np.split(order, breaks), key=lambda group: abs(float(np.mean(load[group]))))
 
 
 def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> FigureOfMerit:

@@ -35,6 +35,8 @@ _ONE_MINUTE = 60.0
 from 10 min on, a third of the creep would be stated)."""
 _FADED = 0.05
 """Autocorrelation at which its sum ends: the noise of an estimate from 400 readings (1/√400)."""
+_GAP = 2.5
+"""Median intervals of a gap, as two lost readings are."""
 _NO_CHANCE = -20.0
 """Logarithm of a probability of 2e-9."""
 _ALIASED = 0.02
@@ -98,7 +100,9 @@ class Health:
     duplicates: float
     """Share of readings equal to the one before."""
     longest_still: float
-    """Longest time without a change of the raw counts, s."""
+    """Longest time without a change of the raw counts, s; a gap in the readings is none."""
+    is_at_end: bool
+    """Whether it was at the end of the range of the readings, as of a converter that saturates."""
     mean: float
     low: float
     high: float
@@ -144,7 +148,8 @@ def examine(samples: CellSamples) -> Health:
         longest_gap=float(np.diff(samples.time).max()),
         unique=len(np.unique(words)),
         duplicates=float(still.mean()),
-        longest_still=_longest_still(time, words),
+        longest_still=_longest_still(time, words)[0],
+        is_at_end=_longest_still(time, words)[1],
         mean=float(value.mean()),
         low=float(value.min()),
         high=float(value.max()),
@@ -222,10 +227,15 @@ def _hum(time: Array, rest: Array, frequency: float) -> Hum:
     return Hum(frequency, float(np.hypot(*pair)), float(left.std()) * math.sqrt(2 / len(rest)))
 
 
-def _longest_still(time: Array, raw: Array) -> float:
+def _longest_still(time: Array, raw: Array) -> tuple[float, bool]:
+    """Longest time without a change, and whether it is at an end of the range."""
+    steps = np.diff(time)
+    read = np.append(0.0, np.cumsum(np.minimum(steps, _GAP * np.median(steps))))
     changes = np.flatnonzero(np.diff(raw) != 0) + 1
     edges = np.concatenate([[0], changes, [len(raw) - 1]])
-    return float(np.diff(time[edges]).max())
+    longest = int(np.argmax(np.diff(read[edges])))
+    word = raw[edges[longest]]
+    return float(np.diff(read[edges])[longest]), bool(word in (raw.min(), raw.max()))
 
 
 def _is_stuck(health: Health) -> bool:
@@ -266,9 +276,11 @@ def _with_remarks(health: Health, duration: float) -> Health:
     elif health.noise_counts < 0.5:
         remarks.append("the noise is below half a count: the division is too coarse to measure it")
     if health.unique > 1 and _is_stuck(health):
+        where = " at the end of their range" if health.is_at_end else ""
+        saturates = "it saturates, or " if health.is_at_end else ""
         remarks.append(
-            f"the counts stood still for {health.longest_still:.3g} s, although they change "
-            "elsewhere: the cell, its converter or the logger was stuck"
+            f"the counts stood still{where} for {health.longest_still:.3g} s, although they change "
+            f"elsewhere: {saturates}the cell, its converter or the logger was stuck"
         )
     if health.duplicates > 0.5 and health.unique > 1:
         remarks.append(
@@ -276,7 +288,8 @@ def _with_remarks(health: Health, duration: float) -> Health:
             "than it converts, or filtered"
         )
     remarks += [
-        f"hum of the mains at {hum.frequency:g} Hz: check shield and grounding"
+        f"hum of the mains at {hum.frequency:g} Hz{_alias(hum.frequency, health.rate)}: check "
+        "shield and grounding"
         for hum in health.hum
         if hum.there and hum.amplitude > 0.3 * health.noise
     ]
@@ -290,6 +303,14 @@ def _with_remarks(health: Health, duration: float) -> Health:
         share = abs(health.creep.change / health.creep.step)
         remarks.append(f"it creeps after the change of load: {share:.2%} of it in 30 minutes")
     return replace(health, remarks=tuple(remarks))
+
+
+def _alias(frequency: float, rate: float) -> str:
+    """What else a tone above half the rate may be."""
+    apparent = abs(frequency - rate * round(frequency / rate))
+    if frequency <= rate / 2:
+        return ""
+    return f", or a vibration of {apparent:.3g} Hz, which {rate:.3g} readings a second show alike"
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> CellSamples:

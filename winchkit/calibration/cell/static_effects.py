@@ -1,16 +1,19 @@
 """Effects of a load cell that points at rest determine: zero, span, curvature, hysteresis.
 
-The difference of reading and load is a linear model of up to six columns; all subsets whose terms
+The difference of reading and load is a linear model of up to seven columns; all subsets whose terms
 are significant (t test, 5 %) are fitted by least squares, and that of least BIC is kept. Its terms
-are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and
-``cell-hysteresis``, so that the values go into a profile, and two that depend on the order of the
-loads: a zero return (all readings of a series after its largest load) and a zero shift (all
-readings after the first largest load). Readings in a unit of their own (counts, mV/V) have their
-zero and span by definition; the other terms are then in newtons of their own span. Series that
-repeat each other give the pure error, with which the lack of fit of the kept model is tested.
+are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and ``cell-
+hysteresis``, so that the values go into a profile, and three that depend on the order of the loads:
+a zero return (all readings of a series after its largest load), a zero shift (all readings after
+the first largest load) and a loop that closes at both ends (4h x (1 − x) of the reading on the way
+down, x the share of the largest load: the parabolas of Rayleigh's law). Readings in a unit of their
+own (counts, mV/V) have their zero and span by definition; the other terms are then in newtons of
+their own span. Series that repeat each other give the pure error, with which the lack of fit of the
+kept model is tested.
 
 References
 ----------
+Bertotti, G. (1998). Hysteresis in Magnetism, ch. 2 (Rayleigh's law). Academic Press.
 Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 and 15. Wiley.
 ISO 376:2011, Calibration of force-proving instruments.
 """
@@ -37,8 +40,9 @@ _TERMS = (
     ("cell-hysteresis", "fraction", "1"),
     ("zero-return", "shift", "N"),
     ("zero-shift", "shift", "N"),
+    ("hysteresis-loop", "height", "N"),
 )
-_RETURNING = (3, 4)
+_RETURNING = (3, 4, 6)
 """Terms that need loads in both directions."""
 _SHIFT = 5
 """Term that needs several series: of one it is the zero return."""
@@ -115,7 +119,9 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
     after = np.array([point.going == "down" for point in points], dtype=np.float64)
     moved = np.maximum.accumulate(after)
     bow, loop = (load / _UNIT_TENSION) ** 2, -up * load
-    columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved])
+    share = load / max(float(np.max(np.abs(load))), 1e-300)
+    closed = 4 * after * share * (1 - np.abs(share))
+    columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved, closed])
     offered = [k for k in range(len(_TERMS)) if k not in (*_RETURNING, _SHIFT) or len(set(up)) > 1]
     if len({point.series for point in points}) == 1 and _SHIFT in offered:
         offered.remove(_SHIFT)

@@ -21,6 +21,8 @@ _DRIVE = {
 """Channel and unit of an object, and the scale of a drive's device file that converts it."""
 _RAW = (("6064h", "counts", 1.0), ("6077h", "%", 0.1))
 """Units by CiA 402 alone: positions in increments, torques in per mille of the rated one."""
+_COUNTER = "6064h"
+"""Object with an INTEGER32, which wraps."""
 _KINDS = ("TPDO", "SDO")
 """Frames with values that a device has measured."""
 
@@ -121,4 +123,5 @@ def _columns(
         for name in part:
             channel, unit, factor = known[name]
             numbers = np.array([values.get(name, math.nan) for _, values in own], dtype=np.float64)
-            yield FileColumn(channel, factor * numbers, unit, group=place)
+            modulus = abs(factor) * 2**32 if name == _COUNTER else math.inf
+            yield FileColumn(channel, factor * numbers, unit, group=place, modulus=modulus)

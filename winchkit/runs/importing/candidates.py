@@ -24,7 +24,7 @@ from winchkit.runs.importing.orientation import (
     quaternion_order,
     vector_names,
 )
-from winchkit.runs.importing.source_stamps import SOURCE_STAMP
+from winchkit.runs.importing.source_stamps import is_source_stamp
 from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
 from winchkit.runs.importing.units.known import (
     BRIDGE,
@@ -322,8 +322,10 @@ def _choose_times(table: ColumnTable, times: Sequence[ChannelCandidate], choice:
     for group in dict.fromkeys(item.column.group for item in clocks):
         own = [item for item in clocks if item.column.group == group]
         best = min(item.rank for item in own)
-        choice.leave((item for item in own if item.rank > best), "another column is time")
-        own = [item for item in own if item.rank == best]
+        stamps = [item for item in own if is_source_stamp(item.column)]
+        others = [item for item in own if item.rank > best and [item] != stamps]
+        choice.leave(others, "another column is time")
+        own = [item for item in own if item not in others]
         for block in _blocks(table, own):
             kept = max(block, key=_quality)
             choice.chosen.append(kept)
@@ -368,7 +370,7 @@ def _quality(item: ChannelCandidate) -> tuple[bool, bool, bool, int]:
     # A few rows out of order are left out.
     steps = np.diff(known[rows_in_order(known)])
     complete = distinct >= 0.99 * len(values) and not (np.any(steps < 0) and np.any(steps > 0))
-    is_source = item.column.name == SOURCE_STAMP
+    is_source = is_source_stamp(item.column)
     return (
         complete and is_source,
         complete and absolute,

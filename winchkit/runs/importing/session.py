@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,14 @@ _CELL_ALONE = (
     "diagnose --run`; import the file together with the one that has the angle, or name it by "
     '--column "motor_angle=COLUMN [deg]", for a run of a winch'
 )
+_CONSTANTS = {
+    "rated_torque": "a share of the rated torque",
+    "torque_constant": "A",
+    "counts_per_turn": "counts",
+    "sensitivity": "mV/V",
+    "capacity": "mV/V",
+}
+"""Constants of answers, with the unit that needs them."""
 _ANGLES, _VELOCITIES = {"motor_angle", "position"}, {"motor_velocity", "velocity"}
 
 
@@ -147,10 +155,31 @@ def guesses_of(
         if not any(guess.file.column(name) for guess in guesses):
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
             raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
+    if mapping is None and guesses and (idle := tuple(_without_use(guesses, tables, answers))):
+        guesses[0] = replace(guesses[0], notes=(*guesses[0].notes, *idle))
     if mapping is None and _lack_angle(guesses):
         text = _CELL_ALONE if _have(guesses, {"tension", "load"}) else NO_ANGLE
         guesses = [replace(guess, notes=(*guess.notes, text)) for guess in guesses]
     return guesses
+
+
+def _without_use(
+    guesses: Sequence[Guess], tables: Sequence[ColumnTable], answers: Answers
+) -> Iterator[str]:
+    """Notes on constants that change nothing: the columns have units of their own."""
+    for name, unit in _CONSTANTS.items():
+        if getattr(answers, name) is None:
+            continue
+        nothing: dict[str, Any] = {name: None}
+        without = replace(answers, **nothing)
+        others = [
+            guess_columns(guess.file, answers_of(guess.file, tables, without)) for guess in guesses
+        ]
+        if all(
+            (one.used, one.questions, one.notes) == (other.used, other.questions, other.notes)
+            for one, other in zip(guesses, others, strict=True)
+        ):
+            yield f"--{name.replace('_', '-')} is not used: no column is in {unit}"
 
 
 def _with_one_motion(
@@ -167,7 +196,9 @@ def _with_one_motion(
         return guesses
     if _have(guesses, {"motor_angle"}):
         motion, concerned = "rotary", {"position"}
-    elif not _have(guesses, {"force"}) and is_linear(replace(tables[0], columns=columns), given):
+    elif _have(guesses, {"force"}):
+        motion, concerned = "linear", {"cable_length", "velocity"}
+    elif is_linear(replace(tables[0], columns=columns), given):
         motion, concerned = "linear", {"cable_length", "velocity", "tension", "load"}
     else:
         return guesses

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -39,6 +40,8 @@ class FileColumn:
     """Position in the file, from 1."""
     source: str = ""
     """Name that is unique within the file."""
+    modulus: float = math.inf
+    """Range of the counter that its numbers are of; infinite where the file does not say."""
     is_derived: bool = False
     """Whether it is computed of other columns, whose names say nothing about its unit."""
 

@@ -31,7 +31,7 @@ from winchkit.units import GRAVITY, UNITS
 _TURN = 2 * math.pi
 _AXES = (set(POSITION), set(ANGLES))
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
-_SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
+_SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP", "MCAP, JSON")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta", "rvec"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 
@@ -232,14 +232,10 @@ def _doubt(work: Work, item: ChosenColumn) -> str:
     """Why an angle may not be in rad; messages of ROS are in rad."""
     if item.base != "motor_angle" or _is_of_ros(work.table):
         return ""
-    return _doubt_of_radians(
-        item.column.known,
-        is_array=work.table.layout in _SI_LAYOUTS,
-        is_one_of_several=sum(other.base == "motor_angle" for other in work.columns) > 1,
-    )
+    return _doubt_of_radians(item.column.known)
 
 
-def _doubt_of_radians(known: Array, *, is_array: bool, is_one_of_several: bool) -> str:
+def _doubt_of_radians(known: Array) -> str:
     """Why values that are rad by convention may be degrees; empty where they are rad.
 
     The names of robotics (``q1``, ``theta``) and the formats of arrays stand for rad. Degrees of a
@@ -253,8 +249,6 @@ def _doubt_of_radians(known: Array, *, is_array: bool, is_one_of_several: bool) 
         return (
             f"; its values of {known.min():g} to {known.max():g} have steps of {_COARSE:g} or more"
         )
-    if is_array and not is_one_of_several:
-        return ""
     return f"; its values of {known.min():.4g} to {known.max():.4g} may be deg or rad"
 
 

@@ -101,6 +101,19 @@ def test_a_modulus_that_is_no_usual_one_is_asked(tmp_path: Path) -> None:
     assert np.ptp(run["motor_angle"]) == pytest.approx(np.ptp(ANGLE), rel=1e-3)
 
 
+@pytest.mark.parametrize(("turn", "unit"), [(360.0, "deg"), (TURN, "rad"), (1.0, "turn")])
+def test_the_number_at_which_an_angle_wraps_gives_its_unit(
+    turn: float, unit: str, tmp_path: Path
+) -> None:
+    path = log(tmp_path / "a.csv", "theta", np.round(np.mod(ANGLE / TURN, 1) * turn, 6))
+    guess = guess_columns(read_table(path))
+    assert not guess.questions
+    (item,) = [one for one in guess.used if one.channel == "motor_angle"]
+    assert (item.unit, item.confidence) == (unit, "derived")
+    run = run_of(streams_of(guess), {})
+    assert run["motor_angle"] == pytest.approx(ANGLE - ANGLE[0], abs=1e-4)
+
+
 def test_steps_of_more_than_a_quarter_of_a_turn_are_asked(tmp_path: Path) -> None:
     """150° from row to row: forwards, or 210° backwards."""
     stored = np.mod(150.3 * np.arange(300), 360)

@@ -25,6 +25,8 @@ _MISSING = {
     *("nan(ind)", "-nan(ind)", "nv", "k.a."),
 }
 _STARS = re.compile(r"[*#]+|-{2,}")
+_ERROR = re.compile(r"#[^\W\d_]+(/0)?[!?]", re.IGNORECASE)
+"""Errors of a spreadsheet in any language: ``#DIV/0!``, ``#WERT!``, ``#NAME?``."""
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 _GROUPED = {
@@ -40,7 +42,7 @@ _INFINITE = re.compile(r"[+-]?(inf|infinity|1\.#inf|∞)", re.IGNORECASE)
 def is_missing(cell: str) -> bool:
     """Whether a cell stands for a missing value."""
     text = cell.strip()
-    return text.casefold() in _MISSING or bool(_STARS.fullmatch(text))
+    return text.casefold() in _MISSING or bool(_STARS.fullmatch(text) or _ERROR.fullmatch(text))
 
 
 def number(cell: str, decimal: str) -> float | None:

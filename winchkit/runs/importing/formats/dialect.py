@@ -25,6 +25,8 @@ _CELL_LINES = 8
 """Line ends that a quoted cell may have."""
 _OPENED = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')
 _CLOSED = re.compile(r'[^"]*"\s*(?:$|[,;\t|])')
+_COMMAS, _GROUPED = re.compile(r"[+-]?\d*,\d*"), re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""Numbers with one comma, and those whose comma may separate thousands."""
 _TEXT_LINES = re.compile(r"\r\n|\n|\r")
 
 
@@ -125,6 +127,23 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
     sample = _blocks(filled)
     return _best(sample, is_mixed=False) or _best(sample, is_mixed=True)
+
+
+def doubt_of_commas(lines: Sequence[str], dialect: Dialect) -> str:
+    """Why quoted numbers of a file with commas between its cells have no certain size.
+
+    Returns: empty where a number shows what its comma is: ``"0,25"`` has decimals.
+    """
+    if dialect.delimiter != "," or dialect.decimal != ",":
+        return ""
+    sample = _blocks([line for line in lines if line.strip()])
+    cells = [cell for line in sample for cell in split_line(line, ",") if _COMMAS.fullmatch(cell)]
+    if not cells or not all(_GROUPED.fullmatch(cell) for cell in cells):
+        return ""
+    return (
+        f'"{cells[0]}" may have a separator of thousands or three decimals: write the numbers '
+        "without separators of thousands, or with a decimal point"
+    )
 
 
 def _best(sample: Sequence[str], *, is_mixed: bool) -> Dialect | None:

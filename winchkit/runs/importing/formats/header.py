@@ -18,6 +18,8 @@ from winchkit.runs.importing.units.spelling import is_unit_row, read_unit, split
 Row = tuple[int, list[str]]
 """Line number and cells."""
 _COMMENT = re.compile(r"^\s*[#%!;*/]+\s*")
+END_OF_HEADER = "***End_of_Header***"
+"""Mark by which LabVIEW ends the header of a file and that of a segment."""
 _NAME = "Name"
 KEYS = frozenset(
     (
@@ -27,6 +29,7 @@ KEYS = frozenset(
     )
 )
 """Keys of a TwinCAT Scope export."""
+_X_VALUE = "X_Value"
 _RULE = re.compile(r":?[-=_+]{2,}:?")
 _NAME_ROW = {"channel name", "channelname", "signal name", "kanalname"}
 _UNIT_ROW = {"unit", "units", "unit symbol", "einheit"}
@@ -70,7 +73,7 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
 
     ``decimal``: decimal sign. Returns: names are empty where the file has none.
     """
-    header = _of_oscilloscope(rows, width, decimal)
+    header = _of_labview(rows, width, decimal) or _of_oscilloscope(rows, width, decimal)
     if header is not None:
         return header
     cut = _start_of_block(rows, width, decimal, is_blank=is_blank)
@@ -87,6 +90,38 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
     return header
+
+
+def _of_labview(rows: Sequence[Row], width: int, decimal: str) -> Header | None:
+    """Names below the last mark, and titled rows of units and steps above it (LVM).
+
+    References
+    ----------
+    National Instruments (2019). Specification for the LabVIEW Measurement File (.lvm).
+    """
+    filled = [cells for _, cells in rows if any(cells)]
+    marks = [n for n, cells in enumerate(filled) if cells[0].startswith(END_OF_HEADER)]
+    if not marks or marks[-1] + 1 >= len(filled):
+        return None
+    segment = {cells[0]: cells for cells in filled[(marks[-2] if marks[1:] else 0) : marks[-1]]}
+    names = [split_unit(name) for name in _padded(filled[marks[-1] + 1], width)]
+    is_clock = "Time" in segment.get("X_Dimension", [])
+    times = [is_clock and name == _X_VALUE for name, _ in names]
+    given = _padded(segment.get("Y_Unit_Label", []), width)
+    units = [
+        own or (unit if read_unit(unit) else "")
+        for (_, own), unit in zip(names, given, strict=True)
+    ]
+    steps = {cell for cell in segment.get("Delta_X", [])[1:] if cell}
+    step = number(steps.pop(), decimal) if len(steps) == 1 else None
+    return Header(
+        ["time" if is_one else name for (name, _), is_one in zip(names, times, strict=True)],
+        ["s" if is_one else unit for unit, is_one in zip(units, times, strict=True)],
+        [()] * width,
+        _metadata(filled[: marks[0]]),
+        step,
+        (tuple(filled[marks[-1] + 1]),),
+    )
 
 
 def _of_oscilloscope(rows: Sequence[Row], width: int, decimal: str) -> Header | None:

@@ -1,6 +1,7 @@
 """Readers of MAT files (version 5, and 7.3 by extra ``hdf5``) and of HDF5 files.
 
-Structures are flattened with dots. Objects of MATLAB classes (table, timetable, timeseries, string)
+Structures are flattened with dots, arrays of them with indices, and signals of Simulink and dSPACE
+have their names. Objects of MATLAB classes (table, timetable, timeseries, string)
 are opaque in a MAT file: they are left out with a note.
 """
 
@@ -22,8 +23,13 @@ from winchkit.runs.importing.table import ColumnTable, readable, refuse_size
 
 _DEEPEST = 8
 """Nesting of structures that is read; those of Simulink have up to five levels."""
+_MOST = 100_000
+"""Elements of cells and structures of a file of version 7.3; recordings have a few for each signal.
+"""
 _HEADER, _COMPRESSED = 128, 15
 """Bytes before the first variable of a MAT file of version 5; type of a compressed variable."""
+_NAMES, _VALUES = ("label", "name", "blockname"), ("values", "data")
+"""Fields of a structure that is a signal."""
 _CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat', 't', 'x')"
 
 
@@ -48,6 +54,7 @@ def read_mat(path: str, data: bytes) -> ColumnTable:
             stream.seek(0)
             found = loadmat(stream, simplify_cells=True)
     arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
     notes = []
     for name, value in found.items():
         if str(name).startswith("__"):
@@ -58,9 +65,10 @@ def read_mat(path: str, data: bytes) -> ColumnTable:
             kind = _first(value, "s2" if own else "_Class")
             notes.append(_object_note(_first(value, "s0") if own else str(name), kind))
             continue
-        arrays.update(_flat(name, value, 0))
+        for path_of, array, unit in _flat(name, value, 0):
+            arrays[path_of], units[path_of] = array, unit
     _refuse_objects(path, arrays, notes)
-    return table_of_arrays(path, "MAT", arrays, notes=notes)
+    return table_of_arrays(path, "MAT", arrays, units=units, notes=notes)
 
 
 def _sizes(data: bytes) -> Iterator[int]:
@@ -95,12 +103,29 @@ def _refuse_objects(path: str, arrays: dict[str, Any], notes: list[str]) -> None
         raise RunError([Fault(note, path) for note in notes])
 
 
-def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    if isinstance(value, dict) and depth < _DEEPEST:
+def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any, str]]:
+    """Arrays of a variable by their path, with the unit where a field beside them has it.
+
+    An array of structures has its index in the path; a structure with the name and the values of a
+    signal (Simulink's scopes, dSPACE) has that name.
+    """
+    if depth >= _DEEPEST:
+        return
+    if isinstance(value, dict):
+        fields = {str(key).casefold(): item for key, item in value.items()}
+        named = next((fields[key] for key in _NAMES if isinstance(fields.get(key), str)), "")
+        is_signal = bool(named.strip()) and any(np.size(fields.get(key, ())) > 1 for key in _VALUES)
         for key, item in value.items():
-            yield from _flat(f"{name}.{key}", item, depth + 1)
-    elif not isinstance(value, dict | list):
-        yield name, value
+            kind = str(key).casefold()
+            if is_signal and kind in _VALUES:
+                yield f"{name}.{named.strip()}", item, str(fields.get("unit") or "")
+            elif not (is_signal and kind in (*_NAMES, "unit")):
+                yield from _flat(f"{name}.{key}", item, depth + 1)
+    elif isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype == object):
+        for index, item in enumerate(value if isinstance(value, list) else np.ravel(value)):
+            yield from _flat(f"{name}[{index}]", item, depth + 1)
+    elif value is not None:
+        yield name, value, ""
 
 
 def read_hdf5(path: str, data: bytes) -> ColumnTable:
@@ -125,19 +150,61 @@ def read_hdf5(path: str, data: bytes) -> ColumnTable:
         source.visititems(visit)
         refuse_size(path, 8 * sum(int(item.size or 0) for item in sets.values()), "arrays")
         for name, item in sets.items():
-            kind = item.attrs.get("MATLAB_class", b"")
             if "MATLAB_object_decode" in item.attrs:
-                notes.append(_object_note(name, _text(kind)))
-                continue
-            if item.attrs.get("MATLAB_empty", 0):
-                # Its numbers are the shape of an empty array.
-                continue
-            if item.dtype.kind not in "fiub" and not item.dtype.names:
-                continue
-            if kind in (b"char", b"cell", "char", "cell") or item.dtype.hasobject:
-                continue
-            arrays[name] = item[()]
-            unit = item.attrs.get("units", item.attrs.get("unit", ""))
-            units[name] = _text(unit)
+                notes.append(_object_note(name, _text(item.attrs.get("MATLAB_class", b""))))
+            elif item.dtype.kind in "fiub" or item.dtype.names:
+                unit = _text(item.attrs.get("units", item.attrs.get("unit", "")))
+                arrays[name], units[name] = item[()], unit
+        if any("MATLAB_class" in item.attrs for item in _own(source).values()):
+            left = [_MOST]
+            values = {
+                name: _of_matlab(item, left, 0)
+                for name, item in _own(source).items()
+                if not name.startswith("#") and "MATLAB_object_decode" not in item.attrs
+            }
+            flat = [one for name, value in values.items() for one in _flat(name, value, 0)]
+            arrays = {name: value for name, value, _ in flat}
+            units = {name: unit for name, _, unit in flat}
     _refuse_objects(path, arrays, notes)
     return table_of_arrays(path, "HDF5", arrays, units=units, notes=notes)
+
+
+def _own(group: Any) -> dict[str, Any]:
+    """Members of a group that are in the file itself."""
+    h5py = library("h5py", "HDF5")
+    names = [n for n in group if isinstance(group.get(n, getlink=True), h5py.HardLink)]
+    members = {name: group[name] for name in names}
+    return {
+        name: item
+        for name, item in members.items()
+        if not (isinstance(item, h5py.Dataset) and (item.external or item.is_virtual))
+    }
+
+
+def _of_matlab(item: Any, left: list[int], depth: int) -> Any:
+    """Value of a variable of MAT 7.3: structures as mappings, arrays of them and cells as lists.
+
+    Cells and the fields of an array of structures are references to the elements. ``left``: number
+    of elements that may still be read, since references may repeat each other without end.
+    """
+    left[0] -= 1
+    if item.attrs.get("MATLAB_empty", 0) or depth > _DEEPEST or left[0] < 0:
+        # The numbers of an empty array are its shape.
+        return None
+    if hasattr(item, "items"):
+        members = _own(item)
+        fields = {name: _of_matlab(part, left, depth + 1) for name, part in members.items()}
+        is_array = fields and all(
+            isinstance(fields[name], list) and "MATLAB_class" not in part.attrs
+            for name, part in members.items()
+        )
+        rows = zip(*fields.values(), strict=False)
+        return [dict(zip(fields, row, strict=True)) for row in rows] if is_array else fields
+    if "ref" in (item.dtype.metadata or {}):
+        references = np.ravel(item[()], order="F")
+        return [_of_matlab(item.file[one], left, depth + 1) for one in references if one]
+    if item.dtype.kind not in "fiub" and not item.dtype.names:
+        return None
+    if _text(item.attrs.get("MATLAB_class", b"")) == "char":
+        return "".join(map(chr, np.ravel(item[()])))
+    return item[()]

@@ -66,7 +66,8 @@ def read_messages(path: str, data: bytes) -> ColumnTable:
     if not columns:
         text = "has no messages with numbers in JSON or ROS 2"
         raise RunError(Fault("; ".join([text, *notes]), path))
-    return ColumnTable(path, "MCAP", named_apart(columns), notes=tuple(notes))
+    layout = "MCAP" if decoders else "MCAP, JSON"
+    return ColumnTable(path, layout, named_apart(columns), notes=tuple(notes))
 
 
 def _decoded(path: str, schema: Any, channel: Any, data: bytes, decoders: dict[int, Any]) -> Any:

@@ -56,6 +56,7 @@ def _read(path: str | Path) -> ColumnTable:
 def _of_text(name: str, data: bytes) -> ColumnTable:
     """JSON, or rows of text."""
     from winchkit.can_trace import TRACE, is_trace
+    from winchkit.runs.importing.formats.fields import read_labelled
     from winchkit.runs.importing.formats.json_file import is_json, read_json
     from winchkit.runs.importing.formats.motion_capture import read_capture
     from winchkit.runs.importing.formats.text import read_text_table
@@ -64,7 +65,7 @@ def _of_text(name: str, data: bytes) -> ColumnTable:
     if is_trace(data):
         raise RunError(Fault(TRACE, name))
     table = read_json(name, data) if is_json(data) else read_capture(name, data)
-    return table or read_text_table(name, data)
+    return table or read_labelled(name, data) or read_text_table(name, data)
 
 
 def _of_arrays(name: str, data: bytes) -> ColumnTable:

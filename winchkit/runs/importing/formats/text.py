@@ -18,11 +18,18 @@ from winchkit.runs.importing.formats.dialect import (
     FEWEST,
     Dialect,
     decode,
+    doubt_of_commas,
     find_dialect,
     split_line,
     whole_lines,
 )
-from winchkit.runs.importing.formats.header import KEYS, Header, Row, keyed_width, read_header
+from winchkit.runs.importing.formats.header import (
+    END_OF_HEADER,
+    Header,
+    Row,
+    keyed_width,
+    read_header,
+)
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
@@ -34,9 +41,10 @@ _COUNTED = 4
 """Columns from which a row that counts them is no chance."""
 _HEAD = 60
 """Lines in which a header ends."""
-_END_OF_HEADER = "***End_of_Header***"
 _COMPARED = 20
 """Rows whose last numbers are compared with that of a row without a line end."""
+_SUMMARY = 12
+"""Most rows of a summary: mean, extremes, deviation and their units."""
 _LEFT_OUT = "The row is left out"
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
@@ -54,7 +62,14 @@ def read_text_table(path: str, data: bytes) -> ColumnTable:
         shown = next((line for line in lines if line.strip()), "")[:60]
         message = f"has no rows of numbers; its first line is {shown!r}"
         raise RunError(Fault(message, path))
-    rows = _SplitLines(lines, dialect.delimiter, numbers)
+    if doubt := doubt_of_commas(lines, dialect):
+        raise RunError(Fault(doubt, path))
+    end = _end_of_header(lines)
+    names = next((n for n in range(end, len(lines)) if lines[n].strip()), end)
+    # LabVIEW has a column of comments, of which rows without one have no cell.
+    width = len(split_line(lines[names], dialect.delimiter)) if end and names < len(lines) else 0
+    dialect = replace(dialect, width=max(width, dialect.width))
+    rows = _SplitLines(lines, dialect.delimiter, numbers, (names, width))
     is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
     return replace(table_of_rows(path, rows, dialect, is_ended=is_ended), layout=layout)
@@ -62,17 +77,25 @@ def read_text_table(path: str, data: bytes) -> ColumnTable:
 
 def _end_of_header(lines: Sequence[str]) -> int:
     """Line after the mark by which LabVIEW ends its headers, which have numbers as well; else 0."""
-    marks = [n for n, line in enumerate(lines[:_HEAD]) if line.startswith(_END_OF_HEADER)]
+    marks = [n for n, line in enumerate(lines[:_HEAD]) if line.startswith(END_OF_HEADER)]
     return marks[-1] + 1 if marks else 0
 
 
 class _SplitLines(Sequence[Row]):
-    """Lines with their number, split when they are read: the cells of a long file are not kept."""
+    """Lines with their number, split when they are read: the cells of a long file are not kept.
+
+    ``least``: line below which rows have at least a number of cells.
+    """
 
     def __init__(
-        self, lines: Sequence[str], delimiter: str, numbers: Sequence[int] | None = None
+        self,
+        lines: Sequence[str],
+        delimiter: str,
+        numbers: Sequence[int] | None = None,
+        least: tuple[int, int] = (0, 0),
     ) -> None:
         self._lines, self._delimiter, self._numbers = lines, delimiter, numbers
+        self._start, self._width = least
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -88,7 +111,10 @@ class _SplitLines(Sequence[Row]):
             return [self[n] for n in range(*index.indices(len(self)))]
         number = index if index >= 0 else len(self) + index
         line = number + 1 if self._numbers is None else self._numbers[number]
-        return line, split_line(self._lines[number], self._delimiter)
+        cells = split_line(self._lines[number], self._delimiter)
+        if number > self._start and any(cells):
+            cells += [""] * (self._width - len(cells))
+        return line, cells
 
 
 @dataclass
@@ -223,9 +249,12 @@ def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
 
 def _first_of_numbers(rows: Sequence[Row], dialect: Dialect, *, is_keyed: bool) -> int | None:
     """Index of the first row of numbers that further ones follow."""
-    head = [rows[n][1][:1] for n in range(min(len(rows), _HEAD))]
-    keys = {_END_OF_HEADER, *(KEYS if is_keyed else ())}
-    marks = [n for n, first in enumerate(head) if first and first[0] in keys]
+    head = [rows[n][1] for n in range(min(len(rows), _HEAD))]
+    marks = [
+        n
+        for n, cells in enumerate(head)
+        if cells[:1] == [END_OF_HEADER] or (is_keyed and _has_title(cells, dialect))
+    ]
     for index in range(marks[-1] + 1 if marks else 0, len(rows)):
         cells = rows[index][1]
         if not _is_numeric(cells, dialect):
@@ -234,6 +263,12 @@ def _first_of_numbers(rows: Sequence[Row], dialect: Dialect, *, is_keyed: bool) 
         if sum(_is_numeric(c, dialect) for c in after) * 2 >= len(after):
             return index
     return None
+
+
+def _has_title(cells: Sequence[str], dialect: Dialect) -> bool:
+    """Whether a row has a title before its cells, and no number or stamp."""
+    is_row = len(cells) > 1 and bool(cells[0])
+    return is_row and number(cells[0], dialect.decimal) is None and not is_stamp(cells[0])
 
 
 def _check_records(path: str, rows: Sequence[Row], first: int, dialect: Dialect) -> None:
@@ -259,10 +294,26 @@ def _remark(cells: Sequence[str], dialect: Dialect) -> int:
     return len(cells) - 1 - places[-1] if places else 0
 
 
-def _not_data(cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last: bool) -> str:
+def _start_of_summary(rows: Sequence[Row], first: int, dialect: Dialect) -> int:
+    """Index behind the last row of numbers, before a few rows with a title: ``Mean;1,2;3,4``."""
+    end = len(rows)
+    if not rows[first][1][0] or _has_title(rows[first][1], dialect):
+        return end
+    for index in range(end - 1, max(first, end - _SUMMARY - 1), -1):
+        cells = rows[index][1]
+        if any(cells) and not _has_title(cells, dialect):
+            return index + 1
+    return end
+
+
+def _not_data(
+    cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last: bool, is_summary: bool
+) -> str:
     """What a line between the rows of numbers is; empty for a row with a fault."""
     if is_title:
         return "repeated lines of the header"
+    if is_summary and any(cells[1:]):
+        return "rows of a summary at the end, with a title in place of the first number,"
     if cells[0].startswith(("#", "%")) or cells[0].upper() in {"EOF", "END"}:
         return "comments between the rows"
     # The last line may be cut off.
@@ -305,7 +356,8 @@ def _kept(
     is_blank, least = dialect.delimiter == BLANKS, width - _remark(rows[first][1][:width], dialect)
     last = next((n for n, cells in reversed(rows) if any(cells)), 0)
     titles = {row[0] for row in header.rows}
-    for line, given in islice(rows, first, None):
+    end = _start_of_summary(rows, first, dialect)
+    for index, (line, given) in enumerate(islice(rows, first, None), start=first):
         if not any(given):
             continue
         cells = given[:-1] if len(given) == width + 1 and not given[-1] else given
@@ -314,13 +366,16 @@ def _kept(
         if is_blank and len(cells) != width and len(cells) - _remark(cells, dialect) == least:
             cells, remarks = [*cells, *[""] * width][:width], remarks + 1
         is_title = cells[0] in titles and tuple(cells) in header.rows
-        if len(cells) == width and not is_title:
+        is_summary = index >= end and number(cells[0], dialect.decimal) is None
+        if len(cells) == width and not is_title and not is_summary:
             if line == last and not is_ended and (doubt := _cut_off(cells, rows, dialect)):
                 found.notes.append(doubt)
                 if doubt.endswith(_LEFT_OUT):
                     continue
             found.add(line, cells)
-        elif kind := _not_data(cells, dialect, is_title=is_title, is_last=line == last):
+        elif kind := _not_data(
+            cells, dialect, is_title=is_title, is_last=line == last, is_summary=is_summary
+        ):
             left_out[kind] += 1
         elif line == last and len(cells) < width and not is_ended:
             found.notes.append(

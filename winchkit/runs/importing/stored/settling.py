@@ -26,6 +26,8 @@ from winchkit.runs.importing.units.known import COUNTS, SHARE
 from winchkit.schema.mapping import DATE, MODULO
 
 _TURN = 2 * math.pi
+_TURNS = {360.0: "deg", _TURN: "rad", 1.0: "turn"}
+"""Units of an angle by the number at which it wraps."""
 _RANGES = tuple(2.0**bits for bits in range(8, 33))
 """Ranges of counters: a byte to a double word."""
 
@@ -84,6 +86,9 @@ def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
     name = item.column.source
     if wrap.is_sure:
         _restore(item, f"{MODULO} {wrap.modulus:.12g}")
+        if item.candidate.unit is None and wrap.modulus in _TURNS and item.factor is None:
+            unit = _TURNS[wrap.modulus]
+            item.settle(_TURN / wrap.modulus, unit, "derived", f"wraps at {wrap.modulus:.10g}")
         times = "once" if wrap.count == 1 else f"{wrap.count} times"
         work.notes.append(
             f"'{name}' wraps at {wrap.modulus:.10g} ({times}) and is unwrapped; "
@@ -94,7 +99,9 @@ def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
         f"'{name}' jumps {wrap.count} times by about {wrap.modulus:.4g}, as numbers do that "
         "wrap there; its other steps do not say so for certain"
     )
-    options = (f'--modulo "{name}={wrap.modulus:.6g}"', f'--modulo "{name}=0"')
+    if wrap.modulus not in {*usual, *rare}:
+        text += "; this number is an estimate: that of the counter or encoder is exact"
+    options = (f'--modulo "{name}={wrap.modulus:.12g}"', f'--modulo "{name}=0"')
     work.questions.append(Question(text, options, "modulo"))
     return True
 
@@ -102,6 +109,8 @@ def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
 def _moduli(work: Work, item: ChosenColumn) -> tuple[Collection[float], Collection[float]]:
     """Usual and rare moduli of an angle or a counter; none of another column."""
     unit = item.candidate.unit
+    if math.isfinite(item.column.modulus):
+        return (item.column.modulus,), ()
     if item.role not in {"motor_angle", "cable_length", "swivel"}:
         return (), ()
     if unit is not None and unit.dimension == "angle":
