@@ -36,6 +36,7 @@ from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term
 from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
+from winchkit.quantity_text import quantity
 from winchkit.rendering import Shown
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -145,6 +146,14 @@ class FittedWinchAddition(FittedAddition):
         old = self.addition.terms
         profile = self.regression.dataset.profile
         moved = refit_to_motion(runs, profile, [term for term, _ in old], progress)
+        if moved.rms_after > moved.rms_before:
+            before, after = (quantity(x, moved.unit) for x in (moved.rms_before, moved.rms_after))
+            raise UsageError(
+                f"the motion simulated from the measured torque is off by {after} rms with values "
+                f"refitted to it, and by {before} with those of the prediction, which are the "
+                "better ones: leave the refit out; errors of the torque are integrated twice, and "
+                "outweigh those of the model here"
+            )
         terms = [
             (
                 term,

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.dynamics.forward import GOAL, Setup, motion_of, setup_of
+from winchkit.dynamics.forward import GOAL, Setup, driving_part, motion_of, setup_of
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -105,11 +104,11 @@ def _of_run(
     run: Run, profile: WinchProfile, catalogue: Catalogue | None
 ) -> Iterator[SimulatedError]:
     terms = terms_of(profile, catalogue)
-    (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+    own = driving_part(run, profile, is_torque=True)
     rate, rate_noise = smoothed_rate(own, profile)
-    speed = float(rate[0])
-    setup = setup_of(profile, run, None, speed, is_torque=True)
+    setup = setup_of(profile, run, None, float(rate[0]), is_torque=True)
     yield open_loop_error(profile, terms, own, setup, rate_noise)
     if profile.control is not None and GOAL in own:
-        setup = setup_of(profile, run, None, speed, is_torque=False)
+        own = driving_part(run, profile, is_torque=False)
+        setup = setup_of(profile, run, None, float(rate[0]), is_torque=False)
         yield _error(profile, terms, own, setup, "reference")

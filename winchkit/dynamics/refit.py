@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -30,11 +30,10 @@ from winchkit.arrays import Array
 from winchkit.dynamics.balance import ON_MOTION, balance
 from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed_rate
 from winchkit.dynamics.drives import Inputs
-from winchkit.dynamics.forward import Setup, motion_of, setup_of
+from winchkit.dynamics.forward import Setup, driving_part, motion_of, setup_of
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
-from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.schema.profiles.winch import WinchProfile
@@ -82,8 +81,13 @@ class MotionFit:
     converged: bool
 
     @property
+    def unit(self) -> str:
+        """Of the errors: ``rad``, or ``m`` on a linear axis."""
+        return self.after[0].unit
+
+    @property
     def rms_before(self) -> float:
-        """Error of all runs, rad, or m on a linear axis."""
+        """Error of all runs."""
         return _rms(self.before)
 
     @property
@@ -93,9 +97,9 @@ class MotionFit:
 
     def to_json(self) -> dict[str, Any]:
         """The errors and the status, as the command prints them."""
-        own = {"unit": self.after[0].unit, "runs": [error.to_json() for error in self.after]}
-        names = ("rms_before", "rms_after", "converged")
-        return {**own, **{name: getattr(self, name) for name in names}}
+        names = ("unit", "rms_before", "rms_after", "converged")
+        runs = [error.to_json() for error in self.after]
+        return {**{name: getattr(self, name) for name in names}, "runs": runs}
 
 
 def _rms(errors: Sequence[SimulatedError]) -> float:
@@ -181,7 +185,7 @@ class _Recording:
     @classmethod
     def of(cls, run: Run, profile: WinchProfile) -> _Recording:
         """Raises RunError as :func:`forward`."""
-        (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+        own = driving_part(run, profile, is_torque=True)
         rate, rate_noise = smoothed_rate(own, profile)
         setup = setup_of(profile, run, None, float(rate[0]), is_torque=True)
         angle_noise = local_noise(own["motor_angle"])
@@ -245,6 +249,12 @@ class _Shooting:
         """Initial angle and speed of every piece, (pieces, 2)."""
         return x[len(self.start) :].reshape(-1, 2)
 
+    @cached_property
+    def first(self) -> Array:
+        """Unknowns at which the fit begins."""
+        start = np.clip(self.start, *self.bounds)
+        return np.concatenate([start, self.states_of_data.ravel()])
+
     def at(self, x: Array) -> tuple[tuple[Term, ...], Array]:
         """Effects and initial states at unknowns."""
         return self.terms_at(x[: len(self.start)]), self.states_at(x)
@@ -257,6 +267,19 @@ class _Shooting:
             motion = motion_of(self.profile, terms, setup, _TOLERANCE)
             out.append((motion.angle, float(motion.speed[-1])))
         return out
+
+    @cached_property
+    def _last(self) -> dict[bytes, list[tuple[Array, float]]]:
+        return {}
+
+    def ends_at(self, x: Array) -> list[tuple[Array, float]]:
+        """The same at unknowns; kept, since derivatives begin where the last residual was."""
+        key = x.tobytes()
+        if key not in self._last:
+            found = self.ends(*self.at(x))
+            self._last.clear()
+            self._last[key] = found
+        return self._last[key]
 
     def residual(self, ends: Sequence[tuple[Array, float]], states: Array) -> Array:
         """Errors of the angle at all samples, and weighted gaps between the pieces."""
@@ -276,24 +299,12 @@ class _Shooting:
     def solved(self, progress: Callable[[int], None]) -> MotionFit:
         """The least-squares fit."""
         count, trials = len(self.start), [0]
-        first = np.concatenate([self.start, self.states_of_data.ravel()])
-        free = np.full(2 * len(self.pieces), np.inf)
-        low, high = (
-            np.append(side, sign * free) for side, sign in zip(self.bounds, (-1, 1), strict=True)
-        )
-
-        @lru_cache(maxsize=1)
-        def ends_at(x: bytes) -> list[tuple[Array, float]]:
-            # The derivatives begin where the residuals were computed last.
-            return self.ends(*self.at(np.frombuffer(x)))
-
-        inside = np.clip(first, low, high)
         # Raises what is missing where the start cannot be simulated.
-        rows = len(self.residual(ends_at(inside.tobytes()), self.states_at(inside)))
+        rows = len(self._residual_at(self.first))
 
         def residual(x: Array) -> Array:
             try:
-                return self.residual(ends_at(x.tobytes()), self.states_at(x))
+                return self._residual_at(x)
             except UsageError:
                 # No motion at these values: the solver goes back and takes a shorter step.
                 return np.full(rows, np.nan)
@@ -301,10 +312,13 @@ class _Shooting:
         def jacobian(x: Array) -> Array:
             trials[0] += 1
             progress(trials[0])
-            return self._jacobian_at(x, ends_at(x.tobytes()))
+            return self._jacobian_at(x)
 
+        free = np.full(2 * len(self.pieces), np.inf)
+        low, high = self.bounds
         found = least_squares(
-            residual, inside, jacobian, (low, high), x_scale="jac", max_nfev=_MOST,
+            residual, self.first, jacobian, (np.append(low, -free), np.append(high, free)),
+            x_scale="jac", max_nfev=_MOST,
             ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
         )  # fmt: skip
         covariance = self._covariance(np.asarray(found.jac), found.fun)
@@ -326,7 +340,7 @@ class _Shooting:
     @cached_property
     def error(self) -> float:
         """Error of the pieces at the first values, from the measured states, rms."""
-        ends = self.ends(self.terms, self.states_of_data)
+        ends = self.ends_at(self.first)
         off = [angle - p.measured for p, (angle, _) in zip(self.pieces, ends, strict=True)]
         return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
 
@@ -346,9 +360,12 @@ class _Shooting:
             for one, (angle, speed) in zip(self.whole, begun, strict=True)
         )  # fmt: skip
 
-    def _jacobian_at(self, x: Array, ends: Sequence[tuple[Array, float]]) -> Array:
+    def _residual_at(self, x: Array) -> Array:
+        return self.residual(self.ends_at(x), self.states_at(x))
+
+    def _jacobian_at(self, x: Array) -> Array:
         """Differences: each value changes all pieces, a state changes its own one."""
-        count, (terms, states) = len(self.start), self.at(x)
+        count, ends, (terms, states) = len(self.start), self.ends_at(x), self.at(x)
         here = self.residual(ends, states)
         out = np.zeros((len(here), len(x)))
         _, high = self.bounds

@@ -51,7 +51,7 @@ def refit_lines(fitted: MotionFit | None) -> list[str]:
     if fitted is None:
         return []
     errors = (fitted.rms_before, fitted.rms_after)
-    before, after = (quantity(x, fitted.after[0].unit) for x in errors)
+    before, after = (quantity(x, fitted.unit) for x in errors)
     text = f"simulated from the measured torque, the motion is off by {after} rms; by {before} "
     lines = entries([text + "with the values of the prediction"]) + _meaning(fitted.after)
     if not fitted.converged:
