@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,11 @@ from winchkit.schema.profiles.axis import LinearAxisProfile
 
 Values = NDArray[np.float64]
 DROPPED = 20
+EVERY = 10
+"""Samples of which one is simulated in a fit, whose force is the mean around it; the errors that
+are printed are those of all samples."""
+FITS = 3
+"""Fits of a start, each with the difference between few and all samples computed anew."""
 PUBLISHED = {
     ("rotor-inertia", "mass"): 95.11,
     ("motor-viscous", "viscosity"): 203.5,
@@ -78,12 +84,34 @@ def read(path: Path) -> Run:
     return Run(run.name, run.time, channels)
 
 
+def thinned(run: Run, terms: Sequence[Term]) -> Run:
+    """Every tenth sample of a run, its position less what thinning changes with these effects."""
+    weights = np.concatenate([np.arange(1, EVERY + 1), np.arange(EVERY - 1, 0, -1)]) / EVERY**2
+    padded = np.pad(run["force"], EVERY - 1, mode="edge")
+    force = Channel(np.convolve(padded, weights, "valid")[::EVERY], "N")
+    few = replace(run, time=run.time[::EVERY], channels={
+        "position": Channel(run["position"][::EVERY], "m"), "force": force})  # fmt: skip
+    speed = initial_speed(run)
+    changed = simulated(terms, few, speed) - simulated(terms, run, speed)[::EVERY]
+    moved = Channel(few["position"] + changed, "m")
+    return replace(few, channels={"position": moved, "force": force})
+
+
+def initial_speed(run: Run) -> float:
+    """Speed of the first sample by a parabola through those that are not compared, m/s."""
+    first = slice(DROPPED + 1)
+    return float(np.polyfit(run.time[first] - run.time[0], run["position"][first], 2)[1])
+
+
+def simulated(terms: Sequence[Term], run: Run, speed: float) -> Values:
+    """Position from the first sample, (n,), m."""
+    setup = setup_of(PROFILE, run, None, speed, is_torque=True)
+    return motion_of(PROFILE, terms, setup).angle
+
+
 def error(terms: Sequence[Term], run: Run) -> float:
     """Position error, rms, m."""
-    position = run["position"]
-    speed = (position[3] - position[0]) / (run.time[3] - run.time[0])
-    setup = setup_of(PROFILE, run, None, float(speed), is_torque=True)
-    off = motion_of(PROFILE, terms, setup).angle - position
+    off = simulated(terms, run, initial_speed(run)) - run["position"]
     return float(np.sqrt(np.mean(off[DROPPED:] ** 2)))
 
 
@@ -101,10 +129,13 @@ def main() -> None:
         rows = []
         for index in range(asked.starts):
             start = usual * np.exp(SPREAD * random.standard_normal(len(usual)) * (index > 0))
-            found = refit_to_motion([train], PROFILE, terms_of(names, start))
-            fitted = {term.effect.id: term.values for term in found.terms}
+            terms: Sequence[Term] = terms_of(names, start)
+            for _ in range(FITS):
+                found = refit_to_motion([thinned(train, terms)], PROFILE, terms)
+                terms = found.terms
+            fitted = {term.effect.id: term.values for term in terms}
             values = np.array([fitted[effect][name] for effect, name in names])
-            row = error(found.terms, train), error(found.terms, test), values
+            row = error(terms, train), error(terms, test), values
             rows.append(row)
             print(f"  start {index}: train {row[0] * 1e3:.3f} mm, test {row[1] * 1e3:.3f} mm  "
                   f"{np.array2string(values, precision=4)}"

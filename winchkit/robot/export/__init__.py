@@ -1,0 +1,1 @@
+"""A robot's profile for controllers and simulators: C99, and a model of MuJoCo."""

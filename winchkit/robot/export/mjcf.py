@@ -1,0 +1,2 @@
+def robot_mjcf(robot, lines):
+    return "", []
