@@ -26,6 +26,5 @@ def export_model(
             f"robot '{profile.name}' is written as {' or '.join(writers)}, not as '{to}'; write "
             "the profile of one line's winch in that form"
         )
-    robot, lines, left = lines_of(profile, catalogue)
-    text, missing = writers[to](robot, lines)
-    return ExportedModel(text, (*missing, *left))
+    text, missing = writers[to](*lines_of(profile, catalogue))
+    return ExportedModel(text, tuple(missing))
