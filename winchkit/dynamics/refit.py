@@ -144,7 +144,7 @@ def refit_to_motion(
     fitted = tuple(index for index, term in enumerate(terms) if _acts_on_motion(term))
     if not fitted:
         raise UsageError("no effect acts between the motor's torque and its motion: nothing to fit")
-    whole = tuple(_Recording.of(run, profile) for run in runs)
+    whole = tuple(_WholeRun.of(run, profile) for run in runs)
     pieces = tuple(piece for one in whole for piece in one.pieces(profile, terms))
     return _Shooting(profile, tuple(terms), fitted, whole, pieces).solved(progress)
 
@@ -172,7 +172,7 @@ class _Piece:
 
 
 @dataclass(frozen=True)
-class _Recording:
+class _WholeRun:
     """A whole run with the channels of the model."""
 
     run: Run
@@ -183,7 +183,7 @@ class _Recording:
     """Of the angle and the speed."""
 
     @classmethod
-    def of(cls, run: Run, profile: WinchProfile) -> _Recording:
+    def of(cls, run: Run, profile: WinchProfile) -> _WholeRun:
         """Raises RunError as :func:`forward`."""
         own = driving_part(run, profile, is_torque=True)
         rate, rate_noise = smoothed_rate(own, profile)
@@ -219,7 +219,7 @@ class _Shooting:
     terms: tuple[Term, ...]
     fitted: tuple[int, ...]
     """Effects between the torque and the motion."""
-    whole: tuple[_Recording, ...]
+    whole: tuple[_WholeRun, ...]
     pieces: tuple[_Piece, ...]
 
     @cached_property
