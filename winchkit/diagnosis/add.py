@@ -147,10 +147,10 @@ class FittedWinchAddition(FittedAddition):
         profile = self.regression.dataset.profile
         moved = refit_to_motion(runs, profile, [term for term, _ in old], progress)
         if moved.rms_after > moved.rms_before:
-            before, after = (quantity(x, moved.unit) for x in (moved.rms_before, moved.rms_after))
+            was, now = (quantity(x, moved.unit) for x in (moved.rms_before, moved.rms_after))
             raise UsageError(
-                f"the motion simulated from the measured torque is off by {after} rms with values "
-                f"refitted to it, and by {before} with those of the prediction, which are the "
+                f"the motion simulated from the measured torque is off by {now} rms with values "
+                f"refitted to it, and by {was} with those of the prediction, which are the "
                 "better ones: leave the refit out; errors of the torque are integrated twice, and "
                 "outweigh those of the model here"
             )

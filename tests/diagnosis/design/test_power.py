@@ -156,21 +156,6 @@ def test_a_run_that_shows_nothing_of_a_rival_distinguishes_it_too() -> None:
     assert power_of(separation(coming, thermal, creep, NOISE, known=known)) > 0.9
 
 
-def test_a_law_that_contains_the_other_is_separated_from_it_in_either_order() -> None:
-    """Stribeck friction imitates Coulomb friction exactly, and not the other way round."""
-    regression = TimeSeriesRegression(dataset())
-    simple = term("pulley-coulomb", friction=0.02)
-    larger = term("pulley-stribeck", coulomb=0.02, static=0.03, stribeck_speed=0.02)
-    pairs = [(simple, larger), (larger, simple)]
-    found = plan_offers(regression, pairs, NOISE, [], threshold=BAR)
-    assert max(offer.powers[0] for offer in found) > 0.9
-    for offer in found:
-        assert offer.powers[0] == pytest.approx(offer.powers[1])
-    assert {run.separates for run in next_runs(regression, pairs[:1], NOISE)} == {
-        ("pulley-coulomb", "pulley-stribeck")
-    }
-
-
 def test_what_no_motion_separates_is_left_to_the_card() -> None:
     """On a grooved drum a radius and a ratio are the same at every angle."""
     (offer,) = offers("drum-radius", "gear-ratio")

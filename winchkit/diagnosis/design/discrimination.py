@@ -61,10 +61,10 @@ def next_runs(
     dataset = regression.dataset
     programmes = list(candidates(dataset, range_of_runs(dataset)))
     for first, second in pairs:
-        offers, known = [], PairInformation.of(regression, first, second, noise)
+        offers, known = [], information_of(regression, first, second, noise)
         for kind, programme in programmes:
             minutes = programme.dataset.recordings[0].signals.time[-1] / 60
-            noncentrality = known.separation(programme, noise)
+            noncentrality = separation(programme, first, second, noise, known=known)
             offers.append((noncentrality / minutes, power_of(noncentrality), kind.name))
         # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
@@ -132,34 +132,6 @@ def information_of(
     triangle = np.asarray(np.linalg.qr(np.column_stack([own, shared_columns, signature]), mode="r"))
     kept = triangle[own.shape[1] :, own.shape[1] :]
     return Information(kept[:, :-1], kept[:, -1], _residual_ss(kept[:, :-1], kept[:, -1]))
-
-
-@dataclass(frozen=True)
-class PairInformation:
-    """Information of the runs so far on a pair of effects, either of which may be the true one."""
-
-    orders: tuple[tuple[Term, Term, Information | None], ...]
-
-    @classmethod
-    def of(
-        cls, regression: Regression, first: Term, second: Term, noise: Mapping[str, float]
-    ) -> PairInformation:
-        """Of both orders: the first is true, the second may have any size."""
-        pairs = ((first, second), (second, first))
-        return cls(tuple((a, b, information_of(regression, a, b, noise)) for a, b in pairs))
-
-    def separation(
-        self, programme: Regression, noise: Mapping[str, float], repeats: int = 1
-    ) -> float:
-        """λ of the effect that the other one imitates worse.
-
-        An effect that contains the other one imitates it exactly; then only that it is true can
-        show, and a run in which nothing shows leaves the simpler one.
-        """
-        return max(
-            separation(programme, a, b, noise, known=known, repeats=repeats)
-            for a, b, known in self.orders
-        )
 
 
 def _rows(

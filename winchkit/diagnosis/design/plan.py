@@ -10,7 +10,6 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.detectability import DetectionThreshold
 from winchkit.diagnosis.design.discrimination import (
     LEAST_POWER,
-    PairInformation,
     information_of,
     power_of,
     separation,
@@ -104,12 +103,15 @@ def offers(
         for t, known in usual
         if known and not _is_detected(threshold, t, known.residual_ss)
     ]
-    known_pairs = [PairInformation.of(regression, a, b, noise) for a, b in pairs]
+    known_pairs = [(a, b, information_of(regression, a, b, noise)) for a, b in pairs]
     out = []
     for kind, run in candidates(dataset, operating_range):
         motion = run.dataset.recordings[0].signals.time[-1] / 60
         minutes = repeats * motion + _operator_minutes(kind)
-        powers = tuple(power_of(known.separation(run, noise, repeats)) for known in known_pairs)
+        powers = tuple(
+            power_of(separation(run, a, b, noise, known=known, repeats=repeats))
+            for a, b, known in known_pairs
+        )
         shows = tuple(
             term.effect.id
             for term, known in hidden
