@@ -1,7 +1,8 @@
 """EMPS simulated forward: values refitted to the motion of the training file, from many starts.
 
 Prints, for each model, the position error (rms) of the training and the test file by the start with
-the least training error, and the spread over the starts. The first 20 samples are not compared; the
+the least training error, and the spread over the starts; each start is fitted by multiple shooting
+(``winchkit.dynamics.refit``). The first 20 samples are not compared; the
 initial state is given. The test file takes no part in the fit or the choice.
 
     python benchmarks/emps_forward.py FOLDER [--starts 20]
@@ -14,26 +15,26 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from winchkit.dynamics.drives import Inputs
-from winchkit.dynamics.forward import Setup, motion_of
+from winchkit.dynamics.forward import motion_of, setup_of
+from winchkit.dynamics.refit import refit_to_motion
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.linear_axis import linear_effect
 from winchkit.effects.term import Term
-from winchkit.runs import Run, read_run
+from winchkit.runs import Channel, Run, read_run
 from winchkit.schema.profiles.axis import LinearAxisProfile
 
 Values = NDArray[np.float64]
 DROPPED = 20
 EVERY = 10
-"""Samples of which one is simulated in the fit, whose force is the mean around it; the errors that
+"""Samples of which one is simulated in a fit, whose force is the mean around it; the errors that
 are printed are those of all samples."""
-CORRECTIONS = 3
+FITS = 3
 """Fits of a start, each with the difference between few and all samples computed anew."""
 PUBLISHED = {
     ("rotor-inertia", "mass"): 95.11,
@@ -62,7 +63,7 @@ MODELS = {
 }
 SPREAD = 0.3
 """Standard deviation of the logarithm of the starting values."""
-PROFILE = LinearAxisProfile("emps")
+PROFILE = LinearAxisProfile("emps", motion="linear")
 CATALOGUE = load_catalogue()
 
 
@@ -75,49 +76,43 @@ def terms_of(names: Sequence[tuple[str, str]], values: Values) -> list[Term]:
     return [Term(linear_effect(CATALOGUE[effect]), own) for effect, own in found.items()]
 
 
-def setup_of(run: Run, every: int = 1) -> Setup:
-    """Force and initial state of a run; with ``every`` averaged between the samples kept."""
-    force, time = run["motor_torque"], run.time
-    if every > 1:
-        weights = np.concatenate([np.arange(1, every + 1), np.arange(every - 1, 0, -1)])
-        padded = np.pad(force, every - 1, mode="edge")
-        force = np.convolve(padded, weights / every**2, "valid")[::every]
-        time = time[::every]
-    speed = (run["motor_angle"][3] - run["motor_angle"][0]) / (run.time[3] - run.time[0])
-    inputs = Inputs(time, {"torque": force})
-    return Setup(run.name, time, float(run["motor_angle"][0]), float(speed), inputs)
+def read(path: Path) -> Run:
+    """A file with the channels of a linear axis."""
+    run = read_run(path)
+    names = {"position": ("motor_angle", "m"), "force": ("motor_torque", "N")}
+    channels = {name: Channel(run[old], unit) for name, (old, unit) in names.items()}
+    return Run(run.name, run.time, channels)
 
 
-def error(names: Sequence[tuple[str, str]], values: Values, run: Run) -> float:
+def thinned(run: Run, terms: Sequence[Term]) -> Run:
+    """Every tenth sample of a run, its position less what thinning changes with these effects."""
+    weights = np.concatenate([np.arange(1, EVERY + 1), np.arange(EVERY - 1, 0, -1)]) / EVERY**2
+    padded = np.pad(run["force"], EVERY - 1, mode="edge")
+    force = Channel(np.convolve(padded, weights, "valid")[::EVERY], "N")
+    few = replace(run, time=run.time[::EVERY], channels={
+        "position": Channel(run["position"][::EVERY], "m"), "force": force})  # fmt: skip
+    speed = initial_speed(run)
+    changed = simulated(terms, few, speed) - simulated(terms, run, speed)[::EVERY]
+    moved = Channel(few["position"] + changed, "m")
+    return replace(few, channels={"position": moved, "force": force})
+
+
+def initial_speed(run: Run) -> float:
+    """Speed of the first sample by a parabola through those that are not compared, m/s."""
+    first = slice(DROPPED + 1)
+    return float(np.polyfit(run.time[first] - run.time[0], run["position"][first], 2)[1])
+
+
+def simulated(terms: Sequence[Term], run: Run, speed: float) -> Values:
+    """Position from the first sample, (n,), m."""
+    setup = setup_of(PROFILE, run, None, speed, is_torque=True)
+    return motion_of(PROFILE, terms, setup).angle
+
+
+def error(terms: Sequence[Term], run: Run) -> float:
     """Position error, rms, m."""
-    motion = motion_of(PROFILE, terms_of(names, values), setup_of(run), 1e-8)
-    return float(np.sqrt(np.mean((motion.angle - run["motor_angle"])[DROPPED:] ** 2)))
-
-
-def refitted(names: Sequence[tuple[str, str]], start: Values, run: Run) -> Values:
-    """Values with the least position error, from a start; none changes its sign.
-
-    Few samples are simulated, and what they differ by from all of them is added to the motion; it
-    is computed again with the values that are found.
-    """
-    setup, whole, values = setup_of(run, EVERY), setup_of(run), start
-    measured = run["motor_angle"][::EVERY]
-
-    def position(values: Values, of: Setup) -> Values:
-        return motion_of(PROFILE, terms_of(names, values), of, 1e-6).angle
-
-    for _ in range(CORRECTIONS):
-        added = position(values, whole)[::EVERY] - position(values, setup) - measured
-
-        def residual(shares: Values, scale: Values = values, added: Values = added) -> Values:
-            return (position(scale * shares, setup) + added)[DROPPED // EVERY :]
-
-        found = least_squares(
-            residual, np.ones(len(start)), bounds=(0.05, 20.0), diff_step=1e-4, max_nfev=12,
-            x_scale="jac", ftol=1e-5, xtol=1e-5,
-        )  # fmt: skip
-        values = values * found.x
-    return values
+    off = simulated(terms, run, initial_speed(run)) - run["position"]
+    return float(np.sqrt(np.mean(off[DROPPED:] ** 2)))
 
 
 def main() -> None:
@@ -127,18 +122,24 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--models", type=int, nargs="*", default=[0, 1, 2])
     asked = parser.parse_args()
-    train, test = (read_run(asked.folder / f"{name}.csv") for name in ("train", "test"))
+    train, test = (read(asked.folder / f"{name}.csv") for name in ("train", "test"))
     random = np.random.default_rng(46)
     for label, model in [list(MODELS.items())[k] for k in asked.models]:
         names, usual = list(model), np.array(list(model.values()))
         rows = []
         for index in range(asked.starts):
             start = usual * np.exp(SPREAD * random.standard_normal(len(usual)) * (index > 0))
-            values = refitted(names, start, train)
-            row = error(names, values, train), error(names, values, test), values
+            terms: Sequence[Term] = terms_of(names, start)
+            for _ in range(FITS):
+                found = refit_to_motion([thinned(train, terms)], PROFILE, terms)
+                terms = found.terms
+            fitted = {term.effect.id: term.values for term in terms}
+            values = np.array([fitted[effect][name] for effect, name in names])
+            row = error(terms, train), error(terms, test), values
             rows.append(row)
             print(f"  start {index}: train {row[0] * 1e3:.3f} mm, test {row[1] * 1e3:.3f} mm  "
-                  f"{np.array2string(values, precision=4)}", flush=True)  # fmt: skip
+                  f"{np.array2string(values, precision=4)}"
+                  f"{'' if found.converged else '  (not converged)'}", flush=True)  # fmt: skip
         best = min(rows, key=lambda row: row[0])
         errors = 1e3 * np.array([row[:2] for row in rows])
         print(f"{label}: train {best[0] * 1e3:.2f} mm, test {best[1] * 1e3:.2f} mm")
@@ -147,9 +148,9 @@ def main() -> None:
               f"{errors[:, 1].max():.2f} mm")  # fmt: skip
         for (effect, name), value in zip(names, best[2], strict=True):
             print(f"  {effect} {name} = {value:.4g}")
-    names, values = list(PUBLISHED), np.array(list(PUBLISHED.values()))
+    published = terms_of(list(PUBLISHED), np.array(list(PUBLISHED.values())))
     for run in (train, test):
-        print(f"authors' values: {run.name} {error(names, values, run) * 1e3:.2f} mm")
+        print(f"authors' values: {run.name} {error(published, run) * 1e3:.2f} mm")
 
 
 if __name__ == "__main__":

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from model_files import invoke
-from winchkit import read_profile, write_run
+from winchkit import add, read_profile, write_run
+from winchkit.dynamics import refit
+from winchkit.dynamics.comparison import simulated_errors
+from winchkit.dynamics.forward import Setup, motion_of
+from winchkit.dynamics.integration import SimulatedMotion
 from winchkit.dynamics.refit import MotionFit, refit_to_motion
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import Term
 from winchkit.errors import RunError, UsageError
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.winch import WinchProfile
 
 INERTIA, COULOMB, VISCOUS = 2e-3, 0.05, 4e-3
 TRUE = {"inertia": INERTIA, "torque": COULOMB, "viscosity": VISCOUS}
@@ -39,6 +46,11 @@ def recorded(seed: int, stops: bool = False, noise: float = 1e-3) -> Run:
         "motor_torque": Channel(torque, "N m"),
     }
     return Run(f"r{seed}", time, channels)
+
+
+def reversed_torque(run: Run) -> Run:
+    torque = Channel(-run["motor_torque"], "N m")
+    return replace(run, channels={**run.channels, "motor_torque": torque})
 
 
 def axis(folder: Path, share: float) -> Path:
@@ -107,6 +119,63 @@ def test_what_cannot_be_fitted_is_said(tmp_path: Path) -> None:
         refit_to_motion([without], profile, terms_of(profile, None))
 
 
+def test_a_wrong_sign_is_named_and_nothing_is_written(tmp_path: Path) -> None:
+    source, run, out = axis(tmp_path, 0.9), tmp_path / "r1.csv", tmp_path / "better.toml"
+    write_run(reversed_torque(recorded(1, stops=True)), run)
+    command = ("add", "motor-viscous", "--fit", run, "-p", source, "-o", out)
+    for done in (
+        invoke(*command, "--refit", "motion"),
+        invoke("compare", run, "-p", source, "--forward"),
+    ):
+        assert done.exit_code == 3
+        assert "motor_torque: the sign looks inverted" in done.stderr
+        assert "--column 'motor_torque=-motor_torque [N m]'" in done.stderr
+        assert "inertia" not in done.stderr
+    assert not out.exists()
+    assert "motor_torque: the sign looks inverted" in " ".join(invoke(*command).stdout.split())
+
+
+def test_no_point_is_simulated_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step begins with the motion at which the one before ended."""
+    seen = []
+
+    def counted(
+        profile: WinchProfile, terms: Sequence[Term], setup: Setup, tolerance: float
+    ) -> SimulatedMotion:
+        values = tuple(value for term in terms for value in term.values.values())
+        seen.append((*values, float(setup.time[0]), setup.angle, setup.speed))
+        return motion_of(profile, terms, setup, tolerance)
+
+    monkeypatch.setattr(refit, "motion_of", counted)
+    fitted(tmp_path, 0.9, [recorded(1)])
+    assert len(seen) == len(set(seen))
+
+
+def test_values_that_simulate_worse_are_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile, run = read_profile(axis(tmp_path, 0.9)), recorded(1, stops=True)
+    monkeypatch.setattr(MotionFit, "rms_before", 0.0)
+    with pytest.raises(UsageError, match="those of the prediction, which are the better ones"):
+        add("motor-viscous", [run], profile, refit="motion")
+
+
+def test_missing_torque_at_the_ends_is_cut_and_a_long_gap_is_named(tmp_path: Path) -> None:
+    profile, run = read_profile(axis(tmp_path, 1.0)), recorded(1)
+
+    def without(*rows: slice) -> Run:
+        torque = run["motor_torque"].copy()
+        for one in rows:
+            torque[one] = np.nan
+        return replace(run, channels={**run.channels, "motor_torque": Channel(torque, "N m")})
+
+    (error,) = simulated_errors([without(slice(0, 5), slice(600, 605), slice(-3, None))], profile)
+    assert len(error.time) == len(run) - 8
+    assert error.rms < 0.05
+    with pytest.raises(RunError, match=r"motor_torque: no value for 0\.21 s from 5\.99 s on"):
+        simulated_errors([without(slice(600, 620))], profile)
+
+
 def test_the_command_writes_the_values_of_the_motion(tmp_path: Path) -> None:
     source, run, out = axis(tmp_path, 0.9), tmp_path / "r1.csv", tmp_path / "better.toml"
     write_run(recorded(1, stops=True), run)
@@ -114,6 +183,11 @@ def test_the_command_writes_the_values_of_the_motion(tmp_path: Path) -> None:
         "add", "motor-viscous", "--fit", run, "-p", source, "--refit", "motion", "-o", out
     )
     assert done.exit_code == 0
-    assert "simulated from the measured torque, the motion is off by" in done.stdout
+    text = " ".join(done.stdout.split())
+    assert "simulated from the measured torque, the motion is off by" in text
+    (error,) = simulated_errors([recorded(1, stops=True)], read_profile(out))
+    until = error.meaningful_until
+    said = "the comparison means nothing" if until else "to the end"
+    assert said in text
     values = {term.effect.id: term.values for term in terms_of(read_profile(out), None)}
     assert values["motor-viscous"]["viscosity"] == pytest.approx(VISCOUS, rel=0.02)

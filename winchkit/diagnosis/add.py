@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.linear_axis import in_units_of
+from winchkit.diagnosis.data.sanity import ALARMING, require_drive
+from winchkit.diagnosis.linear_axis import errors_in_units_of, in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.exclusion import without_impacts
@@ -27,6 +28,7 @@ from winchkit.diagnosis.selection.transitions import scanned_transitions, with_f
 from winchkit.diagnosis.selection.weighting import Reweighted, reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
 from winchkit.diagnosis.verdict.profile_values import file_model
+from winchkit.dynamics.refit import MotionFit, refit_to_motion
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
@@ -34,8 +36,10 @@ from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term
 from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
+from winchkit.quantity_text import quantity
 from winchkit.rendering import Shown
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
 
 _STARTS = 4
 """Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
@@ -55,11 +59,14 @@ class Addition(Shown):
         Every effect with its estimates, the new one last.
     notes : tuple of str
         Notes on the data and the weights.
+    motion : MotionFit, optional
+        Errors of the simulated motion, to which the values were refitted.
     """
 
     outputs: Mapping[str, OutputFit]
     terms: tuple[tuple[Term, Mapping[str, Estimate]], ...]
     notes: tuple[str, ...] = ()
+    motion: MotionFit | None = None
 
     @property
     def added(self) -> tuple[Term, Mapping[str, Estimate]]:
@@ -68,7 +75,8 @@ class Addition(Shown):
 
     def to_json(self) -> dict[str, Any]:
         """JSON of ``winchkit add --json``."""
-        return fitted_json(self.added[0].effect.id, self.outputs, self.terms, self.notes)
+        found = fitted_json(self.added[0].effect.id, self.outputs, self.terms, self.notes)
+        return found if self.motion is None else {**found, "motion": self.motion.to_json()}
 
 
 def fitted_json(
@@ -127,19 +135,41 @@ class FittedWinchAddition(FittedAddition):
     engine: TimeSeriesSelection
     noise: BandNoise
 
-    def with_values(
-        self, terms: Sequence[tuple[Term, Mapping[str, Estimate]]]
+    def refitted_to_motion(
+        self, runs: Sequence[Run], progress: Callable[[int], None]
     ) -> FittedWinchAddition:
-        """The same effects at other values, with the errors of the prediction by them.
+        """The same effects at the values that make the measured motion.
 
-        ``terms``: some or all of the addition's effects, in any order.
+        The errors of the outputs are those of the prediction with these values. Raises as
+        :func:`~winchkit.dynamics.refit.refit_to_motion`.
         """
-        values = {term.label: (term, own) for term, own in terms}
+        old = self.addition.terms
+        profile = self.regression.dataset.profile
+        moved = refit_to_motion(runs, profile, [term for term, _ in old], progress)
+        if moved.rms_after > moved.rms_before:
+            was, now = (quantity(x, moved.unit) for x in (moved.rms_before, moved.rms_after))
+            raise UsageError(
+                f"the motion simulated from the measured torque is off by {now} rms with values "
+                f"refitted to it, and by {was} with those of the prediction, which are the "
+                "better ones: leave the refit out; errors of the torque are integrated twice, and "
+                "outweigh those of the model here"
+            )
+        terms = [
+            (
+                term,
+                {
+                    name: Estimate(term.values[name], std[name], own.unit) if name in std else own
+                    for name, own in known.items()
+                },
+            )
+            for term, std, (_, known) in zip(moved.terms, moved.std, old, strict=True)
+        ]
+        values = {term.label: term for term in moved.terms}
         hypothesis = self.final.hypothesis
         at = replace(
             hypothesis,
             terms=tuple(
-                held(values[term.label][0]) if term.label in values else term
+                held(values[term.label]) if term.label in values else term
                 for term in hypothesis.terms
             ),
         )
@@ -153,10 +183,8 @@ class FittedWinchAddition(FittedAddition):
             )
             for name, output in self.addition.outputs.items()
         }
-        new = tuple(values.get(term.label, (term, own)) for term, own in self.addition.terms)
-        return replace(
-            self, addition=replace(self.addition, outputs=outputs, terms=new), final=fitted
-        )
+        new = replace(self.addition, outputs=outputs, terms=tuple(terms), motion=moved)
+        return replace(self, addition=new, final=fitted)
 
 
 def add(
@@ -165,6 +193,8 @@ def add(
     profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
+    *,
+    refit: Literal["motion"] | None = None,
 ) -> Addition:
     """Fit an effect beside those of a profile, all of them refitted; one that is there too.
 
@@ -180,6 +210,9 @@ def add(
         Effects; by default all that are installed.
     band
         Cut-off frequency of the torque's low-pass filter, Hz; of a winch only.
+    refit
+        ``motion``: refit the values so that the measured torque makes the measured motion, as a
+        simulator needs them; of a winch or an axis.
 
     Returns
     -------
@@ -189,11 +222,12 @@ def add(
     Raises
     ------
     UsageError
-        For an effect that is unknown, or that the runs cannot show.
+        For an effect that is unknown, or that the runs cannot show; for a motion that cannot be
+        simulated.
     RunError
-        With every fault of every run.
+        With every fault of every run; where a motion is simulated, for a wrong sign or unit.
     """
-    return fitted_addition(effect_id, runs, profile, catalogue, band).addition
+    return fitted_addition(effect_id, runs, profile, catalogue, band, refit=refit).addition
 
 
 def fitted_addition(
@@ -202,16 +236,30 @@ def fitted_addition(
     profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
+    *,
+    refit: str | None = None,
+    progress: Callable[[int], None] = lambda step: None,
 ) -> FittedAddition:
-    """The same as :func:`add`, with the fits."""
+    """The same as :func:`add`, with the fits.
+
+    ``progress``: called with the number of each step of a refit.
+    """
     require_type(effect_id, str, "effect_id")
     require_types(runs, Run, "runs")
+    if refit not in (None, "motion"):
+        raise UsageError(f"refit '{refit}' is unknown; give motion, or leave it out")
+    if refit and not isinstance(profile, WinchProfile):
+        raise UsageError("a refit to the motion simulates one winch or axis, of a robot --winch")
     if (by_wing := of_wing("add", profile, band)) is not None:
         found: FittedAddition = by_wing(effect_id, runs, profile, catalogue)
         return found
     profile, catalogue = require_winch(profile), catalogue or load_catalogue()
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
-    return fitted_addition_to(effect_id, dataset, catalogue)
+    if not refit:
+        return fitted_addition_to(effect_id, dataset, catalogue)
+    with errors_in_units_of(profile):
+        require_drive(dataset.sanity)
+    return fitted_addition_to(effect_id, dataset, catalogue).refitted_to_motion(runs, progress)
 
 
 def fitted_addition_to(
@@ -412,7 +460,8 @@ def remove(
 
 
 def _notes(engine: TimeSeriesSelection, best: Reweighted) -> tuple[str, ...]:
-    """Notes on the data and the weights, and every instrument with an offset per run."""
+    """Notes on the data and the weights, wrong signs and units, and offsets for every run."""
     dataset = engine.regression.dataset
+    wrong = [f"{f.channel}: {f.text}" for f in dataset.sanity if f.code in ALARMING]
     offsets = [finding.text for finding in dataset.sanity if finding.code == "zeroed-anew"]
-    return (*dataset.notes, *offsets, *best.notes)
+    return (*dict.fromkeys(wrong), *dataset.notes, *offsets, *best.notes)

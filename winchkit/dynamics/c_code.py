@@ -14,7 +14,6 @@ from winchkit.dynamics.expression import Expression, Operation, ordered, stateme
 from winchkit.dynamics.step import (
     BEFORE,
     OUTPUTS,
-    LineSample,
     inputs_of,
     outputs_of,
     step_of,
@@ -78,7 +77,7 @@ static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *le
 /* At rest: motor angle (rad) at a length (m) under a load (N), by Newton from the nominal line. */
 static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
 {{
-{nominal}    for (int i = 0; i < 4; ++i) {{
+{nominal}    for (int i = 0; i < 5; ++i) {{
         {p}_real there, arm;
         {p}_at_rest(angle, load, &there, &arm);
         angle += (there - length) / arm;
@@ -96,7 +95,7 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
     fields = {"p": p, "P": p.upper(), "name": profile.name}
     out = [_HEAD.format(**fields)]
     for c in step.constants:
-        value = _literal(c.value, p)
+        value = c_literal(c.value, p)
         out.append(f"#define {p.upper()}_{c.name.upper()} {value} /* {c.unit}; {c.source} */\n")
     inputs = inputs_of(profile)
     members = {name: told for name, *told in inputs.values()}
@@ -106,17 +105,18 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
         "{\n", f"{{\n    int is_started;\n    {p}_input before;\n", 1
     )
     out.append(state)
-    starts = "".join(f"    state->{m.name} = {_literal(m.start, p)};\n" for m in step.memories)
-    names = {symbol: f"input->{name}" for symbol, (name, *_) in inputs.items()}
+    starts = "".join(f"    state->{m.name} = {c_literal(m.start, p)};\n" for m in step.memories)
+    constants = {c.name: f"{p.upper()}_{c.name.upper()}" for c in step.constants}
+    names = constants | {symbol: f"input->{name}" for symbol, (name, *_) in inputs.items()}
     names |= {BEFORE + n: f"state->before.{name}" for n, (name, *_) in inputs.items()}
     names |= {m.name: f"state->{m.name}" for m in step.memories}
     targets = [f"output->{n}" for n in step.outputs] + [f"state->{m.name}" for m in step.memories]
     roots = [*step.outputs.values(), *(m.after for m in step.memories)]
-    body = _body(step, p, roots, targets, names)
+    body = c_body(p, roots, targets, names)
     out.append(_STEP.format(**fields, starts=starts, body=body))
     if not isinstance(profile, AxisProfile):
-        rest = _body(step, p, step.at_rest, ["*length", "*arm"], {})
-        nominal = _body(step, p, [step.nominal_angle], [f"{p}_real angle"], {})
+        rest = c_body(p, step.at_rest, ["*length", "*arm"], constants)
+        nominal = c_body(p, [step.nominal_angle], [f"{p}_real angle"], constants)
         out.append(_AT_REST.format(**fields, rest=rest, nominal=nominal))
     return "".join([*out, "#endif\n"])
 
@@ -134,26 +134,23 @@ def _struct(p: str, kind: str, members: Mapping[str, Sequence[str]]) -> str:
     return f"\ntypedef struct {{\n{lines}}} {p}_{kind};\n"
 
 
-def _literal(value: float, p: str) -> str:
+def c_literal(value: float, p: str) -> str:
+    """A number of C."""
     text = (
         "NAN" if isnan(value) else f"{'-' * (value < 0)}INFINITY" if isinf(value) else repr(value)
     )
     return f"(({p}_real){text})"
 
 
-def _body(
-    step: LineSample,
-    p: str,
-    roots: Sequence[Expression],
-    targets: Sequence[str],
-    names: dict[str, str],
+def c_body(
+    p: str, roots: Sequence[Expression], targets: Sequence[str], names: Mapping[str, str]
 ) -> str:
-    names = {c.name: f"{p.upper()}_{c.name.upper()}" for c in step.constants} | names
+    """Statements that assign expressions to ``targets``; ``names`` are of their symbols."""
 
     def text(operation: Operation) -> str:
         return operation.c.replace("F(", f"{p.upper()}_F(").replace("(real)", f"({p}_real)")
 
-    lines, results = statements(roots, names, text, lambda value: _literal(value, p))
+    lines, results = statements(roots, names, text, lambda value: c_literal(value, p))
     # Every result is computed before the first target, which may be an input of another.
     body = "".join(f"    const {p}_real {name} = {right};\n" for name, right in lines)
     body += "".join(f"    const {p}_real r{i} = {one};\n" for i, one in enumerate(results))

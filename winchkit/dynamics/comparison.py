@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.dynamics.forward import GOAL, Setup, motion_of, setup_of
+from winchkit.dynamics.forward import GOAL, Setup, driving_part, motion_of, setup_of
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
+from winchkit.effects.term import Term
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -72,29 +72,43 @@ def smoothed_rate(run: Run, profile: WinchProfile) -> tuple[Array, float]:
     return clock.rate, clock.rate_noise
 
 
+def open_loop_error(
+    profile: WinchProfile, terms: Sequence[Term], run: Run, setup: Setup, rate_noise: float
+) -> SimulatedError:
+    """Error of the motion that the measured torque makes.
+
+    ``run``: with the channels of the model. ``rate_noise``: standard deviation of the initial
+    speed, rad/s.
+    """
+    found = _error(profile, terms, run, setup, "torque")
+    faster = replace(setup, speed=setup.speed + rate_noise)
+    grown = np.abs(motion_of(profile, terms, faster).angle - found.simulated)
+    beyond = np.flatnonzero(grown > found.rms)
+    return replace(found, meaningful_until=float(run.time[beyond[0]]) if len(beyond) else None)
+
+
+def _error(
+    profile: WinchProfile, terms: Sequence[Term], run: Run, setup: Setup, driven_by: str
+) -> SimulatedError:
+    measured = run["motor_angle"]
+    simulated = motion_of(profile, terms, setup).angle
+    error = simulated - measured
+    return SimulatedError(
+        run.name, driven_by, "m" if profile.is_linear else "rad",
+        float(np.sqrt(np.mean(error**2))), float(np.max(np.abs(error))), float(np.std(measured)),
+        None, run.time, measured, simulated,
+    )  # fmt: skip
+
+
 def _of_run(
     run: Run, profile: WinchProfile, catalogue: Catalogue | None
 ) -> Iterator[SimulatedError]:
     terms = terms_of(profile, catalogue)
-    (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
-    measured = own["motor_angle"]
+    own = driving_part(run, profile, is_torque=True)
     rate, rate_noise = smoothed_rate(own, profile)
-    speed = float(rate[0])
-    for driven_by in ("torque", "reference"):
-        if driven_by == "reference" and (profile.control is None or GOAL not in own):
-            continue
-        setup = setup_of(profile, run, None, speed, is_torque=driven_by == "torque")
-        simulated = motion_of(profile, terms, setup).angle
-        error = simulated - measured
-        rms = float(np.sqrt(np.mean(error**2)))
-        until = None
-        if driven_by == "torque":
-            faster: Setup = replace(setup, speed=speed + rate_noise)
-            grown = np.abs(motion_of(profile, terms, faster).angle - simulated)
-            beyond = np.flatnonzero(grown > rms)
-            until = float(own.time[beyond[0]]) if len(beyond) else None
-        yield SimulatedError(
-            run.name, driven_by, "m" if profile.is_linear else "rad", rms,
-            float(np.max(np.abs(error))), float(np.std(measured)), until,
-            own.time, measured, simulated,
-        )  # fmt: skip
+    setup = setup_of(profile, run, None, float(rate[0]), is_torque=True)
+    yield open_loop_error(profile, terms, own, setup, rate_noise)
+    if profile.control is not None and GOAL in own:
+        own = driving_part(run, profile, is_torque=False)
+        setup = setup_of(profile, run, None, float(rate[0]), is_torque=False)
+        yield _error(profile, terms, own, setup, "reference")

@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Literal
 
+from winchkit import wings
 from winchkit.arguments import positive, require_type
 from winchkit.dynamics.c_code import as_json, c_header
 from winchkit.dynamics.mjcf import mjcf
@@ -13,6 +14,7 @@ from winchkit.dynamics.python_code import python_module
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
+from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 
@@ -26,7 +28,7 @@ class ExportedModel:
 
 
 def export_model(
-    profile: WinchProfile,
+    profile: WinchProfile | RobotProfile,
     to: Literal["c", "python", "mjcf", "json"],
     catalogue: Catalogue | None = None,
     load_mass: float | None = None,
@@ -35,11 +37,11 @@ def export_model(
 
     Parameters
     ----------
-    profile : WinchProfile
-        The winch or the axis.
+    profile : WinchProfile or RobotProfile
+        The winch, the axis or the robot.
     to : {"c", "python", "mjcf", "json"}
         A header in C99 that needs ``math.h`` only, a Python module that needs ``math`` only, a
-        model of MuJoCo, or the formulas as JSON.
+        model of MuJoCo, or the formulas as JSON; of a robot C or MuJoCo.
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional
@@ -56,7 +58,11 @@ def export_model(
         For an unknown form, effects that have no formula of one sample (not MuJoCo), and a profile
         without masses (MuJoCo).
     """
+    if (by_wing := wings.call("export_model", profile)) is not None:
+        found: ExportedModel = by_wing(profile, to, catalogue, load_mass)
+        return found
     require_type(profile, WinchProfile, "profile")
+    assert isinstance(profile, WinchProfile), "just required"
     terms = terms_of(profile, catalogue)
     if load_mass is not None:
         load_mass = positive("export_model", "load_mass", load_mass)
@@ -65,8 +71,8 @@ def export_model(
     if to == "python":
         return ExportedModel(python_module(profile, terms))
     if to == "json":
-        found = json.dumps(as_json(profile, terms), indent=1, ensure_ascii=False)
-        return ExportedModel(f"{found}\n")
+        formulas = json.dumps(as_json(profile, terms), indent=1, ensure_ascii=False)
+        return ExportedModel(f"{formulas}\n")
     if to == "mjcf":
         text, missing = mjcf(profile, terms, load_mass)
         return ExportedModel(text, tuple(missing))

@@ -162,6 +162,15 @@ OPERATIONS: Mapping[str, Operation] = {
         "F(hypot)({}, {})",
         lambda x: tuple(one / apply("hypot", *x) for one in x),
     ),
+    "arctan2": Operation(
+        math.atan2,
+        "atan2({}, {})",
+        "F(atan2)({}, {})",
+        lambda x: (
+            x[1] / (x[0] * x[0] + x[1] * x[1]),
+            number(-1) * x[0] / (x[0] * x[0] + x[1] * x[1]),
+        ),
+    ),
     "maximum": Operation(
         max,
         "max({}, {})",
@@ -332,6 +341,7 @@ def statements(
 
 _GLOBALS: dict[str, Any] = {
     **{name: getattr(math, name) for name in OPERATIONS if hasattr(math, name)},
+    "atan2": math.atan2,
     "floor": lambda x: float(math.floor(x)),
     "over": over,
     "power": power,

@@ -36,6 +36,9 @@ _TEMPERATURE = 20.0
 """°C: at which every thermal effect is zero."""
 GOAL = "reference_angle"
 """Channel with the reference that a drive followed, rad, or m on a linear axis."""
+_BRIDGED = 0.1
+"""s: of missing values between two others over which an input is a straight line, as it is between
+its samples; some cycles of a bus that lost them (rule of thumb)."""
 _NEWTON_STEPS = 4
 """As of :mod:`winchkit.model.line`."""
 
@@ -196,13 +199,12 @@ def setup_of(
     Raises RunError as :func:`forward`.
     """
     require_type(run, Run, "torque" if is_torque else "reference")
-    (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
-    place, time = run.path or run.name, run.time
-    driving = "motor_torque" if is_torque else GOAL if GOAL in run else "motor_angle"
-    values = _complete(run, driving)
-    speed = initial_speed
+    run = driving_part(run, profile, is_torque=is_torque)
+    time = run.time
+    driving = _driving(run, is_torque=is_torque)
+    values, speed = run[driving], initial_speed
     if speed is None and "motor_velocity" in run:
-        speed = float(_complete(run, "motor_velocity")[0])
+        speed = float(run["motor_velocity"][0])
     if speed is None and not is_torque:
         speed = float((values[1] - values[0]) / (time[1] - time[0]))
     if speed is None:
@@ -212,15 +214,15 @@ def setup_of(
             f"{'velocity' if profile.is_linear else 'motor_velocity'}; give --initial-speed, such "
             f"as '0 {unit}' for a start at rest"
         )
-        raise RunError(Fault(message, place))
+        raise RunError(Fault(message, run.path or run.name))
     angle = profile.reference.motor_angle
     if "motor_angle" in run:
-        angle = float(_complete(run, "motor_angle")[0])
+        angle = float(run["motor_angle"][0])
     mass, signals = None, {}
     if not isinstance(profile, AxisProfile):
         mass = load_mass if load_mass is not None else run.load_mass
         if mass is None and "load" in run:
-            signals["load"] = _complete(run, "load")
+            signals["load"] = run["load"]
     if is_torque:
         signals["torque"] = values
     else:
@@ -230,14 +232,54 @@ def setup_of(
     return Setup(f"{run.name}-forward", time, angle, speed, Inputs(time, signals), mass)
 
 
-def _complete(run: Run, name: str) -> Array:
-    """A channel without missing values; raises RunError."""
-    values = run[name]
-    if (missing := int(np.count_nonzero(~np.isfinite(values)))) or len(values) < 2:
-        reason = f"{missing} missing values" if missing else f"{len(values)} values"
-        message = f"{name}: {reason}; a simulation needs one at each of at least two times"
-        raise RunError(Fault(message, run.path or run.name))
-    return values
+def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
+    """The part of a run with what drives a simulation, in the channels of the model.
+
+    From the first to the last sample at which all of it is known; short gaps between are straight
+    lines. Raises RunError for fewer than two samples and for a longer gap.
+    """
+    (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+    used = {_driving(run, is_torque=is_torque), "motor_angle", "motor_velocity"}
+    if not isinstance(profile, AxisProfile) and run.load_mass is None:
+        used.add("load")
+    own = {name: run[name] for name in sorted(used) if name in run}
+    run[_driving(run, is_torque=is_torque)]  # Raises without it.
+    known = np.all([np.isfinite(values) for values in own.values()], axis=0)
+    rows = np.flatnonzero(known)
+    place = run.path or run.name
+    if len(rows) < 2:
+        message = (
+            f"{', '.join(own)}: {len(rows)} samples with a value in each; a simulation needs two "
+            "at least"
+        )
+        raise RunError(Fault(message, place))
+    kept = slice(rows[0], rows[-1] + 1)
+    time, faults = run.time[kept], list[Fault]()
+    channels = {
+        name: replace(channel, values=channel.values[kept])
+        for name, channel in run.channels.items()
+    }
+    for name, whole in own.items():
+        values = whole[kept]
+        there = np.flatnonzero(np.isfinite(values))
+        gaps = np.where(np.diff(there) > 1, np.diff(time[there]), 0.0)
+        longest = int(np.argmax(gaps))
+        if gaps[longest] > _BRIDGED:
+            message = (
+                f"{name}: no value for {gaps[longest]:.3g} s from {time[there[longest]]:.4g} s "
+                f"on, above the {_BRIDGED:g} s that a straight line bridges; cut the run there"
+            )
+            faults.append(Fault(message, place))
+        bridged = np.interp(time, time[there], values[there])
+        channels[name] = replace(channels[name], values=bridged)
+    if faults:
+        raise RunError(faults)
+    return replace(run, time=time, channels=channels)
+
+
+def _driving(run: Run, *, is_torque: bool) -> str:
+    """Channel that drives a simulation."""
+    return "motor_torque" if is_torque else GOAL if GOAL in run else "motor_angle"
 
 
 def _of_programme(

@@ -327,7 +327,8 @@ class Integrator:
         if load < 0.0:
             raise UsageError(
                 f"the cable is slack at {time:.4g} s: its tension would be {load:.3g} N, below 0; "
-                "the load no longer follows the winch, so that the motion is not defined"
+                "the load no longer follows the winch, so that the motion is not defined; at the "
+                "start of a run the torque does not hold the load, as one with the wrong sign"
             )
         return y[0], y[1], acceleration, torque, load, mode.direction
 

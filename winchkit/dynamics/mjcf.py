@@ -7,7 +7,8 @@ that the load follows the unstrained cable as in :func:`winchkit.forward`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from math import cos, pi, sin
 from xml.sax.saxutils import escape, quoteattr
 
@@ -23,7 +24,7 @@ from winchkit.units import GRAVITY
 
 _STEP = 2.5e-4
 """s: of the integration; the stiffest part is the equality of the cable, of twice this time."""
-_SMALL = 1e-9
+SMALL = 1e-9
 """kg and kg m²: of a body whose inertia is the armature of its joint; MuJoCo refuses zero."""
 _Attributes = Mapping[str, float]
 Law = Callable[[Mapping[str, float], float], _Attributes]
@@ -52,13 +53,26 @@ the joint."""
 _ROTARY = {"mass": "inertia", "force": "torque"}
 
 
-def mjcf(
-    profile: WinchProfile, terms: Sequence[Term], load_mass: float | None = None
-) -> tuple[str, list[str]]:
-    """The model, and what it lacks of the profile.
+@dataclass(frozen=True)
+class MujocoJoint:
+    """The joint of a drum or an axis as MuJoCo has it."""
 
-    ``load_mass``: on the cable of a winch, kg. Raises UsageError for a profile without masses, and
-    for a winch without a load.
+    attributes: str
+    body: str
+    """Inertial element of the body that it moves."""
+    gear: float
+    """Of the motor: joint torque by motor torque."""
+    missing: list[str]
+    comments: list[str]
+
+
+def joint_of(
+    profile: WinchProfile, terms: Sequence[Term], elsewhere: Collection[str] = ()
+) -> MujocoJoint:
+    """The joint of a profile with its effects.
+
+    ``elsewhere``: effects with a counterpart beside the joint. Raises UsageError for a profile
+    without masses.
     """
     found: dict[str, float] = {}
     missing: list[str] = []
@@ -66,6 +80,10 @@ def mjcf(
     ratio = profile.gearbox.ratio
     fitted = {table.id: table.values.get("fitted") for table in profile.effect}
     for term in terms:
+        if (std := _std(fitted.get(term.effect.id))) is not None:
+            comments.append(f"{term.label}: std {std}")
+        if term.effect.id in elsewhere:
+            continue
         law = COUNTERPARTS.get(term.effect.id)
         values = {_ROTARY.get(name, name): value for name, value in term.values.items()}
         if law is None or values.get(TRANSITION, 0.0) != 0.0:
@@ -74,51 +92,67 @@ def mjcf(
             continue
         for name, value in law(values, ratio).items():
             found[name] = found.get(name, 0.0) + value
-        if (std := _std(fitted.get(term.effect.id))) is not None:
-            comments.append(f"{term.label}: std {std}")
     inertia = found.pop("armature", 0.0)
-    is_axis = isinstance(profile, AxisProfile)
     if inertia <= 0.0:
         raise UsageError(
             f"profile '{profile.name}' has no mass that MuJoCo could move: add the effect "
             "rotor-inertia"
         )
-    if not is_axis and load_mass is None:
-        raise UsageError(
-            f"profile '{profile.name}' is a winch, and no load hangs on its cable: give --load-mass"
-        )
     gravity, phase = found.pop("gravity", 0.0), found.pop("phase", 0.0)
     body, inertia = _pendulum(gravity, phase, inertia)
     attributes = {"armature": inertia, **found}
     joint = " ".join(f'{name}="{value:.17g}"' for name, value in attributes.items() if value)
+    return MujocoJoint(joint, body, ratio * profile.gearbox.direction, missing, comments)
+
+
+def mjcf(
+    profile: WinchProfile, terms: Sequence[Term], load_mass: float | None = None
+) -> tuple[str, list[str]]:
+    """The model, and what it lacks of the profile.
+
+    ``load_mass``: on the cable of a winch, kg. Raises UsageError for a profile without masses, and
+    for a winch without a load.
+    """
+    joint = joint_of(profile, terms)
+    missing = joint.missing
+    is_axis = isinstance(profile, AxisProfile)
+    if not is_axis and load_mass is None:
+        raise UsageError(
+            f"profile '{profile.name}' is a winch, and no load hangs on its cable: give --load-mass"
+        )
     kind = 'type="slide" axis="1 0 0"' if profile.is_linear else 'type="hinge" axis="0 1 0"'
     load, equality = ("", "")
     if not is_axis:
         load, equality = _load(profile, load_mass or 0.0, missing)
-    head = f"{escape(profile.name)}: written by winchkit export-model; SI units, the control is"
-    listed = "".join(f"\n  {escape(line)}" for line in (
-        *comments, *(f"no counterpart here: {one}" for one in missing)))  # fmt: skip
-    gear = ratio * profile.gearbox.direction
     return (
         f"""\
-<!-- {head} the motor's torque.{listed}
--->
-<mujoco model={quoteattr(profile.name)}>
-  <compiler angle="radian" autolimits="true"/>
-  <option timestep="{_STEP}" integrator="implicitfast" gravity="0 0 -{GRAVITY}"/>
-  <worldbody>
+{mujoco_head(profile.name, joint.comments, missing)}  <worldbody>
     <body name="machine">
-      <joint name="machine" {kind} {joint}/>
-      {body}
+      <joint name="machine" {kind} {joint.attributes}/>
+      {joint.body}
     </body>
 {load}  </worldbody>
 {equality}  <actuator>
-    <motor name="motor" joint="machine" gear="{gear:.17g}"/>
+    <motor name="motor" joint="machine" gear="{joint.gear:.17g}"/>
   </actuator>
 </mujoco>
 """,
         missing,
     )
+
+
+def mujoco_head(name: str, comments: Sequence[str], missing: Sequence[str]) -> str:
+    """Begin of a model, with the deviations of fitted values and what it lacks."""
+    lines = (*comments, *(f"no counterpart here: {one}" for one in missing))
+    listed = "".join(f"\n  {escape(line)}" for line in lines)
+    head = f"{escape(name)}: written by winchkit export-model; SI units, the control is"
+    return f"""\
+<!-- {head} the motor's torque.{listed}
+-->
+<mujoco model={quoteattr(name)}>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{_STEP}" integrator="implicitfast" gravity="0 0 -{GRAVITY}"/>
+"""
 
 
 def _std(fitted: object) -> object:
@@ -132,9 +166,9 @@ def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]
     Any mass m at a distance l with m g l of this torque is the same; half of the inertia is taken
     from the armature for it. Returns: the body's inertial element, and the armature.
     """
-    small = f'diaginertia="{_SMALL} {_SMALL} {_SMALL}"'
+    small = f'diaginertia="{SMALL} {SMALL} {SMALL}"'
     if gravity == 0.0:
-        return f'<inertial pos="0 0 0" mass="{_SMALL}" {small}/>', inertia
+        return f'<inertial pos="0 0 0" mass="{SMALL}" {small}/>', inertia
     length = inertia * GRAVITY / (2 * abs(gravity))
     mass = abs(gravity) / (GRAVITY * length)
     turn = phase if gravity > 0 else phase + pi
@@ -144,31 +178,36 @@ def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]
 
 def _load(profile: WinchProfile, mass: float, missing: list[str]) -> tuple[str, str]:
     """The load on a slide downwards, and the equality that pays out the cable."""
-    drum, wound = drum_of(profile), np.asarray(2 * pi * profile.reference.wound_turns)
-    match drum:
-        case Grooved():
-            arm, growth = float(drum.arm(wound)), 0.0
-        case Archimedean():
-            arm, growth = float(drum.arm(wound)), drum.growth
-        case Squared():
-            arm, growth = float(drum.arm(wound)), pi * drum.build_up
-        case Spiral():
-            missing.append("spiral drum, whose steps of the radius are an even growth here")
-            arm, growth = (
-                drum.winding_radius + drum.growth * profile.reference.wound_turns,
-                drum.growth,
-            )
     body = f"""\
     <body name="load">
       <joint name="cable" type="slide" axis="0 0 -1"/>
-      <inertial pos="0 0 0" mass="{mass:.17g}" diaginertia="{_SMALL} {_SMALL} {_SMALL}"/>
+      <inertial pos="0 0 0" mass="{mass:.17g}" diaginertia="{SMALL} {SMALL} {SMALL}"/>
     </body>
 """
-    polynomial = f"0 {-arm:.17g} {-growth / (4 * pi):.17g} 0 0"
-    equality = f"""\
-  <equality>
-    <joint joint1="cable" joint2="machine" polycoef="{polynomial}" solref="{2 * _STEP} 1" \
-solimp="0.999 0.9999 0.001"/>
-  </equality>
-"""
-    return body, equality
+    arm, growth = arm_and_growth(profile, missing)
+    return body, f"  <equality>\n{wound_equality('cable', 'machine', -arm, -growth)}  </equality>\n"
+
+
+def arm_and_growth(profile: WinchProfile, missing: list[str]) -> tuple[float, float]:
+    """Arm at the reference, m/rad of the drum, and its growth per turn, m."""
+    drum, wound = drum_of(profile), np.asarray(2 * pi * profile.reference.wound_turns)
+    match drum:
+        case Grooved():
+            return float(drum.arm(wound)), 0.0
+        case Archimedean():
+            return float(drum.arm(wound)), drum.growth
+        case Squared():
+            return float(drum.arm(wound)), pi * drum.build_up
+        case Spiral(radius, growth):
+            missing.append("spiral drum, whose steps of the radius are an even growth here")
+            return radius + growth * profile.reference.wound_turns, growth
+    raise TypeError(f"{type(drum).__name__} is no winding law of this model")
+
+
+def wound_equality(slide: str, drum: str, arm: float, growth: float) -> str:
+    """Cable of a slide that a drum winds: the polynomial of its wound length, stiffly kept."""
+    polynomial = f"0 {arm:.17g} {growth / (4 * pi):.17g} 0 0"
+    return (
+        f'    <joint joint1="{slide}" joint2="{drum}" polycoef="{polynomial}" '
+        f'solref="{2 * _STEP} 1" solimp="0.999 0.9999 0.001"/>\n'
+    )

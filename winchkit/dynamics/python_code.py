@@ -12,7 +12,20 @@ from winchkit.dynamics.step import BEFORE, inputs_of, outputs_of, step_of
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-_FUNCTIONS = ("cos", "exp", "expm1", "floor", "hypot", "inf", "log", "log1p", "nan", "sin", "tanh")
+_FUNCTIONS = (
+    "atan2",
+    "cos",
+    "exp",
+    "expm1",
+    "floor",
+    "hypot",
+    "inf",
+    "log",
+    "log1p",
+    "nan",
+    "sin",
+    "tanh",
+)
 _HELPERS = {one.__name__: one for one in (sign, over, power, root)}
 _MODULE = '''\
 """{title}: written by winchkit export-model; Python without other packages, SI units."""

@@ -28,13 +28,12 @@ from scipy.optimize import least_squares
 from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
 from winchkit.dynamics.balance import ON_MOTION, balance
-from winchkit.dynamics.comparison import smoothed_rate
+from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed_rate
 from winchkit.dynamics.drives import Inputs
-from winchkit.dynamics.forward import Setup, motion_of, setup_of
+from winchkit.dynamics.forward import Setup, driving_part, motion_of, setup_of
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
-from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.schema.profiles.winch import WinchProfile
@@ -68,26 +67,44 @@ class MotionFit:
     std : tuple of dict of str to float
         Standard deviations of the new values, SI; empty of an effect that does not act on the
         motion.
-    unit : str
-        Of the errors: ``rad``, or ``m`` on a linear axis.
-    rms_before, rms_after : float
-        Error of the motion simulated over whole runs from the measured torque: before from the
-        measured initial state, after from that of the fit.
+    before, after : tuple of SimulatedError
+        Error of each run simulated as a whole from the measured torque: before from the measured
+        initial state, after from that of the fit.
     converged : bool
         Whether the fit ended before the limit of its steps.
     """
 
     terms: tuple[Term, ...]
     std: tuple[dict[str, float], ...]
-    unit: str
-    rms_before: float
-    rms_after: float
+    before: tuple[SimulatedError, ...]
+    after: tuple[SimulatedError, ...]
     converged: bool
+
+    @property
+    def unit(self) -> str:
+        """Of the errors: ``rad``, or ``m`` on a linear axis."""
+        return self.after[0].unit
+
+    @property
+    def rms_before(self) -> float:
+        """Error of all runs."""
+        return _rms(self.before)
+
+    @property
+    def rms_after(self) -> float:
+        """The same with the new values."""
+        return _rms(self.after)
 
     def to_json(self) -> dict[str, Any]:
         """The errors and the status, as the command prints them."""
         names = ("unit", "rms_before", "rms_after", "converged")
-        return {name: getattr(self, name) for name in names}
+        runs = [error.to_json() for error in self.after]
+        return {**{name: getattr(self, name) for name in names}, "runs": runs}
+
+
+def _rms(errors: Sequence[SimulatedError]) -> float:
+    squares = sum(error.rms**2 * len(error.time) for error in errors)
+    return float((squares / sum(len(error.time) for error in errors)) ** 0.5)
 
 
 def refit_to_motion(
@@ -127,8 +144,9 @@ def refit_to_motion(
     fitted = tuple(index for index, term in enumerate(terms) if _acts_on_motion(term))
     if not fitted:
         raise UsageError("no effect acts between the motor's torque and its motion: nothing to fit")
-    pieces = tuple(_of_runs(runs, profile, terms))
-    return _Shooting(profile, tuple(terms), fitted, pieces).solved(progress)
+    whole = tuple(_WholeRun.of(run, profile) for run in runs)
+    pieces = tuple(piece for one in whole for piece in one.pieces(profile, terms))
+    return _Shooting(profile, tuple(terms), fitted, whole, pieces).solved(progress)
 
 
 def _acts_on_motion(term: Term) -> bool:
@@ -153,16 +171,32 @@ class _Piece:
         return self.noise is not None
 
 
-def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
-    for run in runs:
-        (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+@dataclass(frozen=True)
+class _WholeRun:
+    """A whole run with the channels of the model."""
+
+    run: Run
+    setup: Setup
+    rate: Array
+    """Motor speed, (n,), rad/s."""
+    noise: tuple[float, float]
+    """Of the angle and the speed."""
+
+    @classmethod
+    def of(cls, run: Run, profile: WinchProfile) -> _WholeRun:
+        """Raises RunError as :func:`forward`."""
+        own = driving_part(run, profile, is_torque=True)
         rate, rate_noise = smoothed_rate(own, profile)
-        whole = setup_of(profile, run, None, float(rate[0]), is_torque=True)
+        setup = setup_of(profile, run, None, float(rate[0]), is_torque=True)
+        angle_noise = local_noise(own["motor_angle"])
+        return cls(own, setup, rate, (max(angle_noise, _EXACT), max(rate_noise, _EXACT)))
+
+    def pieces(self, profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
+        """Stretches that are fitted: one where effects have states that no instrument reads."""
+        whole, angle = self.setup, self.run["motor_angle"]
         law = balance(profile, terms, whole.load_mass, is_load_known="load" in whole.inputs.signals)
         count = 1 if law.states else _PIECES
         ends = np.linspace(0, len(whole.time) - 1, count + 1).round().astype(int)
-        angle = own["motor_angle"]
-        noise = (max(local_noise(angle), _EXACT), max(rate_noise, _EXACT))
         for begin, end in pairwise(ends.tolist()):
             there = slice(begin, end + 1)
             signals = {name: values[there] for name, values in whole.inputs.signals.items()}
@@ -171,10 +205,10 @@ def _of_runs(runs: Sequence[Run], profile: WinchProfile, terms: Sequence[Term]) 
                 whole,
                 time=time,
                 angle=float(angle[begin]),
-                speed=float(rate[begin]),
+                speed=float(self.rate[begin]),
                 inputs=Inputs(time, signals),
             )
-            yield _Piece(setup, angle[there], noise if begin == 0 else None)
+            yield _Piece(setup, angle[there], self.noise if begin == 0 else None)
 
 
 @dataclass(frozen=True)
@@ -185,6 +219,7 @@ class _Shooting:
     terms: tuple[Term, ...]
     fitted: tuple[int, ...]
     """Effects between the torque and the motion."""
+    whole: tuple[_WholeRun, ...]
     pieces: tuple[_Piece, ...]
 
     @cached_property
@@ -214,18 +249,37 @@ class _Shooting:
         """Initial angle and speed of every piece, (pieces, 2)."""
         return x[len(self.start) :].reshape(-1, 2)
 
+    @cached_property
+    def first(self) -> Array:
+        """Unknowns at which the fit begins."""
+        start = np.clip(self.start, *self.bounds)
+        return np.concatenate([start, self.states_of_data.ravel()])
+
+    def at(self, x: Array) -> tuple[tuple[Term, ...], Array]:
+        """Effects and initial states at unknowns."""
+        return self.terms_at(x[: len(self.start)]), self.states_at(x)
+
     def ends(self, terms: Sequence[Term], states: Array) -> list[tuple[Array, float]]:
-        """Angle of every piece at its times, and its last speed; NaN where it is not possible."""
+        """Angle of every piece at its times, and its last speed."""
         out = []
-        for piece, (angle, speed) in zip(self.pieces, states, strict=True):
-            setup = replace(piece.setup, angle=float(angle), speed=float(speed))
-            try:
-                motion = motion_of(self.profile, terms, setup, _TOLERANCE)
-            except UsageError:
-                out.append((np.full_like(piece.measured, np.nan), np.nan))
-            else:
-                out.append((motion.angle, float(motion.speed[-1])))
+        for piece, (angle, speed) in zip(self.pieces, states.tolist(), strict=True):
+            setup = replace(piece.setup, angle=angle, speed=speed)
+            motion = motion_of(self.profile, terms, setup, _TOLERANCE)
+            out.append((motion.angle, float(motion.speed[-1])))
         return out
+
+    @cached_property
+    def _last(self) -> dict[bytes, list[tuple[Array, float]]]:
+        return {}
+
+    def ends_at(self, x: Array) -> list[tuple[Array, float]]:
+        """The same at unknowns; kept, since derivatives begin where the last residual was."""
+        key = x.tobytes()
+        if key not in self._last:
+            found = self.ends(*self.at(x))
+            self._last.clear()
+            self._last[key] = found
+        return self._last[key]
 
     def residual(self, ends: Sequence[tuple[Array, float]], states: Array) -> Array:
         """Errors of the angle at all samples, and weighted gaps between the pieces."""
@@ -245,24 +299,26 @@ class _Shooting:
     def solved(self, progress: Callable[[int], None]) -> MotionFit:
         """The least-squares fit."""
         count, trials = len(self.start), [0]
-        first = np.concatenate([self.start, self.states_of_data.ravel()])
-        free = np.full(2 * len(self.pieces), np.inf)
-        low, high = (
-            np.append(side, sign * free) for side, sign in zip(self.bounds, (-1, 1), strict=True)
-        )
-        if not np.all(np.isfinite(self._residual_at(first))):
-            # The error of the simulation itself says what is missing.
-            for piece in self.pieces:
-                motion_of(self.profile, self.terms, piece.setup, _TOLERANCE)
+        # Raises what is missing where the start cannot be simulated.
+        rows = len(self._residual_at(self.first))
+
+        def residual(x: Array) -> Array:
+            try:
+                return self._residual_at(x)
+            except UsageError:
+                # No motion at these values: the solver goes back and takes a shorter step.
+                return np.full(rows, np.nan)
 
         def jacobian(x: Array) -> Array:
             trials[0] += 1
             progress(trials[0])
             return self._jacobian_at(x)
 
-        inside = np.clip(first, low, high)
+        free = np.full(2 * len(self.pieces), np.inf)
+        low, high = self.bounds
         found = least_squares(
-            self._residual_at, inside, jacobian, (low, high), x_scale="jac", max_nfev=_MOST,
+            residual, self.first, jacobian, (np.append(low, -free), np.append(high, free)),
+            x_scale="jac", max_nfev=_MOST,
             ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
         )  # fmt: skip
         covariance = self._covariance(np.asarray(found.jac), found.fun)
@@ -277,15 +333,14 @@ class _Shooting:
             std.append(own.deviations(found.x[part], deviations[part], term.values))
             place += len(own)
         return MotionFit(
-            terms, tuple(std), "m" if self.profile.is_linear else "rad",
-            self.rms(self.terms, self.states_of_data), self.rms(terms, self.states_at(found.x)),
-            found.status > 0,
+            terms, tuple(std), self.errors(self.terms, self.states_of_data),
+            self.errors(terms, self.states_at(found.x)), found.status > 0,
         )  # fmt: skip
 
     @cached_property
     def error(self) -> float:
         """Error of the pieces at the first values, from the measured states, rms."""
-        ends = self.ends(self.terms, self.states_of_data)
+        ends = self.ends_at(self.first)
         off = [angle - p.measured for p, (angle, _) in zip(self.pieces, ends, strict=True)]
         return float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
 
@@ -294,29 +349,23 @@ class _Shooting:
         """Initial angle and speed of every piece as measured, (pieces, 2)."""
         return np.array([(piece.setup.angle, piece.setup.speed) for piece in self.pieces])
 
-    def rms(self, terms: Sequence[Term], states: Array) -> float:
-        """Error of the whole runs simulated from the states (pieces, 2) at their beginnings."""
-        squares, count = 0.0, 0
-        angle, speed = 0.0, 0.0
-        for piece, state in zip(self.pieces, states.tolist(), strict=True):
-            if piece.is_first:
-                angle, speed = state
-            setup = replace(piece.setup, angle=angle, speed=speed)
-            motion = motion_of(self.profile, terms, setup, _TOLERANCE)
-            angle, speed = float(motion.angle[-1]), float(motion.speed[-1])
-            squares += float(np.sum((motion.angle - piece.measured) ** 2))
-            count += len(piece.measured)
-        return float((squares / count) ** 0.5)
+    def errors(self, terms: Sequence[Term], states: Array) -> tuple[SimulatedError, ...]:
+        """Errors of the whole runs simulated from the states (pieces, 2) at their beginnings."""
+        begun = [state for piece, state in zip(self.pieces, states, strict=True) if piece.is_first]
+        return tuple(
+            open_loop_error(
+                self.profile, terms, one.run,
+                replace(one.setup, angle=float(angle), speed=float(speed)), one.noise[1],
+            )
+            for one, (angle, speed) in zip(self.whole, begun, strict=True)
+        )  # fmt: skip
 
     def _residual_at(self, x: Array) -> Array:
-        states = self.states_at(x)
-        return self.residual(self.ends(self.terms_at(x[: len(self.start)]), states), states)
+        return self.residual(self.ends_at(x), self.states_at(x))
 
     def _jacobian_at(self, x: Array) -> Array:
         """Differences: each value changes all pieces, a state changes its own one."""
-        count, states = len(self.start), self.states_at(x)
-        terms = self.terms_at(x[:count])
-        ends = self.ends(terms, states)
+        count, ends, (terms, states) = len(self.start), self.ends_at(x), self.at(x)
         here = self.residual(ends, states)
         out = np.zeros((len(here), len(x)))
         _, high = self.bounds

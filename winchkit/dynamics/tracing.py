@@ -96,6 +96,9 @@ class Traced(np.ndarray[Any, Any]):
             return traced([folded])[0]
         if method != "__call__":
             raise TypeError(f"numpy.{ufunc.__name__}.{method} has no formula here")
+        if ufunc is np.matmul:
+            # numpy multiplies and adds matrices of objects by the operators of these.
+            return np.matmul(*(np.asarray(traced(x)) for x in inputs)).view(Traced)
         result = _ufunc(ufunc.__name__, inputs)
         if where is not True:
             return _where(where, result, out[0] if out is not None else 0.0)

@@ -24,7 +24,12 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
         [e.run, e.driven_by, *(quantity(x, e.unit) for x in (e.rms, e.largest, e.motion_rms))]
         for e in errors
     ]
-    lines = aligned([_HEAD, *rows], 2)
+    return "\n".join([*aligned([_HEAD, *rows], 2), *_meaning(errors)])
+
+
+def _meaning(errors: Sequence[SimulatedError]) -> list[str]:
+    """Until when the open loop of each run shows the model."""
+    lines = []
     for e in errors:
         if e.meaningful_until is not None:
             text = (
@@ -35,17 +40,23 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
     if all(e.meaningful_until is None for e in errors if e.driven_by == "torque"):
         text = "the uncertain initial speed makes a smaller error than the model, to the end"
         lines += entries([text])
-    return "\n".join(lines)
+    return lines
 
 
-def refit_text(fitted: MotionFit) -> str:
-    """Error of the simulated motion before and after its values were refitted to it."""
-    before, after = (quantity(x, fitted.unit) for x in (fitted.rms_before, fitted.rms_after))
+def refit_lines(fitted: MotionFit | None) -> list[str]:
+    """Error of the simulated motion before and after its values were refitted to it, if they were.
+
+    Returns: lines of at most 80 characters.
+    """
+    if fitted is None:
+        return []
+    errors = (fitted.rms_before, fitted.rms_after)
+    before, after = (quantity(x, fitted.unit) for x in errors)
     text = f"simulated from the measured torque, the motion is off by {after} rms; by {before} "
-    lines = entries([text + "with the values of the prediction"])
+    lines = entries([text + "with the values of the prediction"]) + _meaning(fitted.after)
     if not fitted.converged:
         lines += entries(["the fit to the motion did not converge: its values may change"])
-    return "\n".join(lines)
+    return lines
 
 
 def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError]) -> list[Figure]:

@@ -203,6 +203,9 @@ def addition_text(addition: Addition | Removal) -> str:
 
     Returns: text of at most 80 columns.
     """
+    from winchkit.diagnosis.add import Addition
+    from winchkit.report.simulated import refit_lines
+
     fitted = []
     for term, every in addition.terms:
         values = {name: e for name, e in every.items() if not name.startswith(HOME)}
@@ -215,6 +218,7 @@ def addition_text(addition: Addition | Removal) -> str:
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],
         error_lines(addition.outputs, extended=True),
+        refit_lines(addition.motion) if isinstance(addition, Addition) else [],
         _notes(addition.notes),
     ]
     return joined(blocks)

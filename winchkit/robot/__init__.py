@@ -3,7 +3,8 @@
 ``geometry``, ``forces`` and ``dynamics`` have the model, ``workspace`` where it holds the platform,
 ``identification`` and ``mistakes`` (of tables) what ``calibration`` and ``diagnosis`` share;
 ``bench`` moves the platform, ``sim`` simulates it; ``effects``, ``files``, ``report``, ``web`` and
-``cli`` are the robot's parts of the packages of these names.
+``cli`` are the robot's parts of the packages of these names, and ``export`` writes a robot for
+other programs.
 
     robot = robot_of(read_robot("cabtive"))
     angles = robot.motor_angles(Pose(position, rotation))

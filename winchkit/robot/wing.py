@@ -23,6 +23,7 @@ WING = Wing(
             "check_effects": "winchkit.robot.effects.bind:check_robot",
             "compare": "winchkit.robot.diagnosis.compare:compared",
             "diagnose": "winchkit.robot.diagnosis.diagnose:diagnose",
+            "export_model": "winchkit.robot.export.export:export_model",
             "plan_command": "winchkit.robot.cli.plan:tell_poses",
             "remove": "winchkit.robot.diagnosis.add:remove",
         },

@@ -25,6 +25,7 @@ from winchkit.cli.core.options import (
         "winchkit export-model better.toml --to c -o better.h",
         "winchkit export-model joint-axis --to python -o joint.py",
         "winchkit export-model joint-axis --to mjcf -o joint.xml",
+        "winchkit export-model cabtive --to c -o cabtive.h",
     ),
 )
 @click.argument("profile", type=PROFILE)
@@ -52,24 +53,26 @@ def command(
 
     The header has a step and a batch of cable length, tension and motor torque, with the memory of
     the effects, and the motor angle at a cable length. Of an axis it has the motor torque, with the
-    torque of your own model as an input. It needs math.h only, the Python module math only. The
-    MuJoCo model moves like 'winchkit forward'; effects without a counterpart are listed.
+    torque of your own model as an input. Of a robot it has the cable lengths at a pose, the
+    structure matrix, the closed-form force distribution, and each line's winch. It needs math.h
+    only, the Python module math only. The MuJoCo model moves like 'winchkit forward'; effects
+    without a counterpart are listed.
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
+    from winchkit.cli.model.options import declared_profile
     from winchkit.dynamics.export import export_model
     from winchkit.effects import load_catalogue
     from winchkit.errors import Fault, FileError
     from winchkit.runs.files import refuse_existing
-    from winchkit.schema.read import read_profile
 
     if output is not None:
         refuse_existing(Path(output), replace)
     mass = None if load_mass is None else quantity(load_mass, "mass")
-    declared = read_profile(find("profiles", profile))
+    declared = declared_profile(Path(find("profiles", profile)))
     exported = export_model(declared, form, load_catalogue(effects), mass)
     for one in exported.missing:
-        note(f"no counterpart in MuJoCo: {one}")
+        note(f"not written: {one}")
     if output is None:
         click.echo(exported.text, nl=False)
         return

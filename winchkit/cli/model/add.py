@@ -27,14 +27,9 @@ from winchkit.cli.model.options import (
     write_figures,
     write_page,
 )
-from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from winchkit.cli.core.terminal import ProgressCallback
-    from winchkit.diagnosis.add import Addition, FittedAddition, Removal
-    from winchkit.diagnosis.profiles import Profile
-    from winchkit.dynamics.refit import MotionFit
-    from winchkit.runs.run import Run
+    from winchkit.diagnosis.add import Addition, Removal
 
 
 @click.command(
@@ -86,14 +81,12 @@ def command(
     with progress_bar() as progress:
         own = asked.runs(runs, declared)
         progress(f"fitting {effect}", None)
-        named = asked.placed(effect, declared)
-        fitted = fitted_addition(named, own, declared, catalogue, asked.band)
-        moved = None
-        if refit:
-            fitted, moved = _refitted_to_motion(fitted, own, declared, progress)
+        fitted = fitted_addition(
+            asked.placed(effect, declared), own, declared, catalogue, asked.band,
+            refit=refit, progress=lambda n: progress(f"refitting to the motion, step {n}", None),
+        )  # fmt: skip
     write_addition(asked.source, fitted.addition, names, output, replace=replace)
-    motion = {} if moved is None else {"motion": moved.to_json()}
-    _tell(output, {**fitted.addition.to_json(), **motion}, fitted.addition, moved)
+    _tell(output, fitted.addition.to_json(), fitted.addition)
     if html:
         from winchkit.report.pages.pages import addition_html
 
@@ -151,45 +144,8 @@ def remove(effect: str, runs: Sequence[str], output: str, replace: bool, asked: 
         suggest_next("ledger", "-p", output)
 
 
-def _tell(
-    output: str,
-    data: dict[str, Any],
-    fitted: Addition | Removal | None,
-    moved: MotionFit | None = None,
-) -> None:
-    from winchkit.report.simulated import refit_text
+def _tell(output: str, data: dict[str, Any], fitted: Addition | Removal | None) -> None:
     from winchkit.report.text import addition_text
 
     note(f"written: {output}")
-    lines = [] if fitted is None else [addition_text(fitted)]
-    tell(data, lines if moved is None else [*lines, f"\n{refit_text(moved)}"])
-
-
-def _refitted_to_motion(
-    fitted: FittedAddition, runs: Sequence[Run], profile: Profile, progress: ProgressCallback
-) -> tuple[FittedAddition, MotionFit]:
-    """An addition at the values that make the measured motion; raises UsageError for a robot."""
-    from winchkit.diagnosis.add import FittedWinchAddition
-    from winchkit.diagnosis.results import Estimate
-    from winchkit.dynamics.refit import refit_to_motion
-    from winchkit.schema.profiles.winch import WinchProfile
-
-    if not (isinstance(fitted, FittedWinchAddition) and isinstance(profile, WinchProfile)):
-        raise UsageError("--refit motion simulates one winch or axis; choose one with --winch")
-    old = fitted.addition.terms
-
-    def step(number: int) -> None:
-        progress(f"refitting to the motion, step {number}", None)
-
-    moved = refit_to_motion(runs, profile, [term for term, _ in old], step)
-    new = [
-        (
-            term,
-            {
-                name: Estimate(term.values[name], std[name], own.unit) if name in std else own
-                for name, own in known.items()
-            },
-        )
-        for term, std, (_, known) in zip(moved.terms, moved.std, old, strict=True)
-    ]
-    return fitted.with_values(new), moved
+    tell(data, [] if fitted is None else [addition_text(fitted)])

@@ -79,9 +79,17 @@ def command(
         progress("comparing", None)
         answer = compared(own, declared, asked.catalogue, asked.band)
         errors: list[SimulatedError] = []
-        if is_simulated and isinstance(declared, WinchProfile):
+        if (
+            is_simulated
+            and isinstance(declared, WinchProfile)
+            and isinstance(answer, WinchCompared)
+        ):
+            from winchkit.diagnosis.data.sanity import require_drive
+            from winchkit.diagnosis.linear_axis import errors_in_units_of
             from winchkit.dynamics.comparison import simulated_errors
 
+            with errors_in_units_of(declared):
+                require_drive(answer.regression.dataset.sanity)
             progress("simulating the motion", None)
             errors = simulated_errors(own, declared, asked.catalogue)
     simulated = {"simulated": [error.to_json() for error in errors]} if errors else {}

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
+from winchkit.diagnosis.data.sign_and_scale import mending_column, sign_and_scale
 from winchkit.effects.catalogue import Catalogue
+from winchkit.errors import Fault, RunError
 from winchkit.model.stages import OUTPUTS
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.consistency import INCONSISTENT
@@ -37,6 +38,19 @@ def findings(
 def caveats(found: Sequence[Finding]) -> tuple[str, ...]:
     """Codes of the findings with which no effect is named, each once."""
     return tuple(dict.fromkeys(f.code for f in found if f.code in ALARMING))
+
+
+def require_drive(found: Sequence[Finding]) -> None:
+    """Raise RunError where what drives a simulated motion has a wrong sign or unit."""
+    faults = []
+    for one in found:
+        if one.code in ALARMING and one.channel in ("motor_torque", "load"):
+            column = mending_column(one)
+            mend = f": winchkit import {one.run}.csv --column '{column}'" if column else ""
+            message = f"{one.channel}: {one.text}; no motion is simulated from it; correct it{mend}"
+            faults.append(Fault(message, one.run))
+    if faults:
+        raise RunError(faults)
 
 
 def unrelated(outputs: Collection[str]) -> tuple[Finding, ...]:
