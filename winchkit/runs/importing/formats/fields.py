@@ -149,7 +149,8 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
         return None
     notes = []
     is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
-    if not is_ended and rows.pop(filled[-1], None):
+    if not is_ended and filled[-1] in rows:
+        del rows[filled[-1]]
         notes = ["the last line has no line end and is left out: is the file cut off?"]
     names = dict.fromkeys(name for found in rows.values() for name in found)
     columns = {name: [found.get(name, (np.nan, "")) for found in rows.values()] for name in names}
