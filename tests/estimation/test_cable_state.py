@@ -23,6 +23,7 @@ SIZES = {
     "cell-creep": {"fraction": 0.02, "time_constant": 6.0},
     "cell-hysteresis": {"fraction": 0.02},
     "cable-sag": {"mass_per_length": 0.5},
+    "load-friction-at-place": {"force": 20.0, "place": 5.85, "width": 0.05},
     "guide-offset": {"offset": 0.02, "mismatch": 1e-4},
     "cable-elongation-quartic": {"k1": 1e5, "b2": 10.0, "b3": 0.0, "b4": 0.0},
     "cable-elongation-exponential": {"strain_scale": 1e-3, "force_scale": 100.0},
