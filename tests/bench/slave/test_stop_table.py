@@ -175,3 +175,23 @@ def test_a_stop_in_any_cycle_of_enabling_is_no_trip(tmp_path: Path) -> None:
             bench.stop()
             assert not bench.snapshot.tripped, number
             rig.wait(1.0)
+
+
+def test_targets_that_come_again_after_a_loss_move_no_faster_than_a_fifth_of_the_limit(
+    tmp_path: Path,
+) -> None:
+    """The lag of a second was made up at limits.speed, which then tripped as a runaway."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        winch, speeds = bench.winch["A"], list[float]()
+        limits = winch.wiring.limits
+        bench.on_cycle(lambda seen: speeds.append(abs(seen.winch["A"].cable_speed)))
+        speed = 0.4 * limits.speed
+        winch.move_to(winch.cable_length + 1.5 * speed, speed=speed, wait=False)
+        rig.until(lambda: abs(winch.snapshot.cable_speed) > 0.7 * speed)
+        rig.host_mute = lambda frame: 0x200 <= frame.identifier < 0x280
+        rig.wait(1.0)
+        rig.host_mute = lambda _frame: False
+        rig.wait(2.0)
+        assert not bench.snapshot.tripped
+        assert max(speeds) < speed + 0.22 * limits.speed

@@ -49,6 +49,9 @@ from here in between would abort the transfer, which may be that of a firmware."
 _LEAST_WAY = 1e-3
 """Commanded way (m of cable) of which the motor has to turn half: static friction in a velocity
 loop, and a position loop's last error, are below."""
+_CORRECTED = 0.2
+"""Share of limits.speed by which a lag behind the motion is made up at most: less than what trips
+as a deviation, so that targets that were lost and come again move nothing by surprise."""
 _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = DriveState.OPERATION_ENABLED
@@ -387,7 +390,11 @@ class Controller:
 
     def _follow(self, target: Setpoint, feedback: AxisFeedback) -> None:
         velocity, angle, winding_speed, _, start = target
-        fastest = self.limits.speed / abs(self.cable.at(feedback.angle)[1])
+        arm = self.cable.at(feedback.angle)[1]
+        fastest, planned = self.limits.speed / abs(arm), winding_speed / arm
+        most = _CORRECTED * fastest
+        if not abs(velocity - planned) <= most:
+            velocity = planned + max(-most, min(most, velocity - planned))
         if not abs(velocity) <= fastest:
             velocity = max(-fastest, min(fastest, velocity))
         self._velocity, self.commanded = velocity, winding_speed
