@@ -172,7 +172,7 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
         until(lambda: bench.winch["A"].snapshot.cable_speed > 0.1)
         other.stop()
         assert bench.snapshot.at_rest
-        with pytest.raises(MotionError, match=r"winch A was stopped by .* before the motion"):
+        with pytest.raises(MotionError, match=r"winch A was stopped by .* before its motion"):
             station.refresh("A")
         assert other.end_log() > 5
         assert abs(station.tare(None)) < 8
