@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At
 from winchkit.model.variables import VARIABLES
 
@@ -17,6 +18,12 @@ _BELOW = 0.1
 """Smallest extent over that of the grid."""
 _SAMPLES = 2.0
 """Sampling intervals by which a logger may be late: one of its own, one of the bus."""
+
+
+def window(variable: Array, values: Values) -> Array:
+    """Smooth window around a place of a variable, with the parameters ``place`` and ``width``."""
+    distance = (variable - values["place"]) / values["width"]
+    return np.asanyarray(np.exp(-(distance**2)))
 
 
 def located(effect: Effect, motions: Sequence[At]) -> Effect:

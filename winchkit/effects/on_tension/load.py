@@ -8,7 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
-from winchkit.effects.location import GRID_OF_PLACES
+from winchkit.effects.location import GRID_OF_PLACES, window
 from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.stages import At, Stage
 from winchkit.units import GRAVITY
@@ -108,8 +108,7 @@ LOAD_LEVER = Effect(
 
 
 def _load_friction_at_place(tension: Array, at: At, values: Values) -> Array:
-    distance = (at.free_length - values["place"]) / values["width"]
-    return tension + values["force"] * cable_direction(at, values) * np.exp(-(distance**2))
+    return tension + values["force"] * cable_direction(at, values) * window(at.free_length, values)
 
 
 LOAD_FRICTION_AT_PLACE = Effect(

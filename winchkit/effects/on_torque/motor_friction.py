@@ -6,7 +6,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.effects.location import GRID_OF_PLACES
+from winchkit.effects.location import GRID_OF_PLACES, window
 from winchkit.effects.presliding import START, Presliding, sliding_distance
 from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
 from winchkit.model.stages import At, Stage
@@ -179,8 +179,7 @@ MOTOR_DAHL = Effect(
 
 
 def _friction_at_place(torque: Array, at: At, values: Values) -> Array:
-    distance = (at.drum_angle - values["place"]) / values["width"]
-    return torque + values["torque"] * motor_direction(at, values) * np.exp(-(distance**2))
+    return torque + values["torque"] * motor_direction(at, values) * window(at.drum_angle, values)
 
 
 FRICTION_AT_PLACE = Effect(

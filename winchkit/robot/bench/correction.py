@@ -174,11 +174,6 @@ class CableCorrection:
         self._index, self._cable, self._axis = index, cable, axis
         self._begin = self._slope = self._trimmed = math.nan
 
-    @property
-    def started(self) -> bool:
-        """Whether its winch has started with the others."""
-        return not math.isnan(self._begin)
-
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at a motor angle (rad), at rest or beside a motion of the platform."""
         self._begin, self._slope = angle, 1.0 / self._cable.at(angle)[1]
@@ -189,9 +184,8 @@ class CableCorrection:
     def at(self, time: float, now: float) -> tuple[float, float]:
         """Cable wound in since the start (m) and winding speed (m/s)."""
         found = self.correction.at(self._index, time, now)
-        if self.started:
-            elongation = float(self.correction.elongation[self._index])
-            self._axis.trim_angle = self._trimmed + elongation * self._slope
+        elongation = float(self.correction.elongation[self._index])
+        self._axis.trim_angle = self._trimmed + elongation * self._slope
         return found
 
     def target(self, time: float, angle: float, now: float) -> Setpoint:

@@ -82,7 +82,7 @@ class PlatformPose:
 
         Raises NotPermitted where they fit no pose, or two that the cables can hold.
         """
-        angles = self._angles() - self._trims_so_far()
+        angles = self._angles_without_trims()
         for start in self._starts(angles):
             pulled = self._forces(start)
             found = self.robot.poses_at(angles, start, pulled, tolerance=np.inf, search=np.inf)
@@ -183,10 +183,11 @@ class PlatformPose:
         snapshot = self._bench.snapshot
         return np.array([[snapshot.winch[one.name].motor_angle for one in self._winches]])
 
-    def _trims_so_far(self) -> Array:
-        """Motor angles of corrections of the forces: they elongate cables, the pose stays."""
-        snapshot = self._bench.snapshot
-        return np.array([snapshot.winch[one.name].trim_angle for one in self._winches])
+    def _angles_without_trims(self) -> Array:
+        """Motor angles without the corrections of the forces: these elongate cables, no more."""
+        seen = self._bench.snapshot.winch
+        shown = [seen[winch.name] for winch in self._winches]
+        return np.array([[one.motor_angle - one.trim_angle for one in shown]])
 
     def _forces(self, pose: Pose) -> Array:
         """Cable forces of the plan at a pose at rest, (1, n); zero where there are none."""
