@@ -99,13 +99,14 @@ def test_a_joint_at_three_speeds_has_offsets_presliding_and_gravity() -> None:
 
 
 def test_gravity_is_a_step_with_its_size() -> None:
-    """As a winch, the joint has free curves over a cable length too."""
+    """As a winch, the joint may carry a spring or a heavy cable: in 0.5 rad each is a line."""
     assert DATA is not None
     runs = runs_of("franka-q2", "case3_slow", "case3_middle", "case3_high")
     found = diagnose(runs, read_profile(DATA / "franka-q2" / "profile.toml")).diagnosis
     friction, gravity = found.steps
     assert friction.effects == ("motor-dahl",)
-    assert gravity.effects == ("joint-gravity",)
+    assert gravity.effects[0] == "joint-gravity"
+    assert set(gravity.effects) <= {"joint-gravity", "cable-weight", "spring-balancer"}
     assert 1.0 < gravity.parameters["joint-gravity"]["amplitude"].value < 5.0
     assert not gravity.certain
 
