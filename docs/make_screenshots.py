@@ -109,7 +109,7 @@ def main() -> None:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         views = {
             "diagnose": (diagnose, ["--mystery", "1"]),
-            "bench": (bench, ["--sim", "demo-adequate", "--allow-motion"]),
+            "bench": (bench, ["--sim", "demo-adequate"]),
             "robot": (robot, [str(recorded), "-p", "cabtive"]),
             "library": (
                 library,

@@ -35,7 +35,7 @@ def moving(
         assert changed != text
         (folder / f"{name}.toml").write_text(changed)
         name = f"{name}.toml"
-    found = Served("--sim", name, "--allow-motion", folder=folder)
+    found = Served("--sim", name, folder=folder)
     yield found
     found.end()
 

@@ -48,7 +48,7 @@ def silent(url: str, path: str) -> Iterator[socket.socket]:
     ("arguments", "paths"),
     [
         (["--mystery", "1"], ["/live"]),
-        (["--sim", "demo-adequate", "--allow-motion"], ["/live", "/live/bench"]),
+        (["--sim", "demo-adequate"], ["/live", "/live/bench"]),
     ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

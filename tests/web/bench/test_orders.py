@@ -165,7 +165,7 @@ def test_a_tare_asks_shows_gross_beside_net_and_is_undone(commanding: Commanding
     assert weight == pytest.approx(98.07, abs=4.0), "10 kg at rest"
     page.keyboard.press("t")
     assert "gross 9" in page.inner_text("#dialog")
-    assert "15 N and 400 N" in page.inner_text("#dialog")
+    assert "15 N and 400 N still act on the gross value" in page.inner_text("#dialog")
     page.keyboard.press("Escape")
     assert not page.locator("#dialog").is_visible()
     assert commanding.orders("tare") == []
@@ -174,6 +174,9 @@ def test_a_tare_asks_shows_gross_beside_net_and_is_undone(commanding: Commanding
     commanding.until(lambda: abs(commanding.value(1)) < 4.0)
     words = page.locator("#values .note").nth(1)
     commanding.until(lambda: words.inner_text().startswith("Tension, net; gross 9"))
+    needle = page.locator("#values .gauge").nth(1).locator("rect").last
+    at = float(str(needle.get_attribute("x")).removeprefix("calc(").split("%")[0])
+    assert at == pytest.approx(100.0 * weight / 420.0, abs=1.5), "the limits act on the gross value"
     page.click("#untare")
     commanding.until(lambda: abs(commanding.value(1) - weight) < 4.0)
     commanding.until(lambda: words.inner_text() == "Tension")

@@ -32,7 +32,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
         assert old in text
         text = text.replace(old, new)
     (tmp_path / "tight.toml").write_text(text, encoding="utf-8")
-    found = Served("--sim", str(tmp_path / "tight.toml"), "--allow-motion", folder=tmp_path)
+    found = Served("--sim", str(tmp_path / "tight.toml"), folder=tmp_path)
     yield found
     found.end()
 

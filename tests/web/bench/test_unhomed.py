@@ -28,7 +28,7 @@ def unhomed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     assert changed.count("unhomed") == 1
     assert changed.count("incremental") == 1
     (folder / "unhomed.toml").write_text(changed, encoding="utf-8")
-    served = Served("--sim", "unhomed.toml", "--allow-motion", folder=folder)
+    served = Served("--sim", "unhomed.toml", folder=folder)
     yield served
     served.end()
 

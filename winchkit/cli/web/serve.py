@@ -39,9 +39,9 @@ from winchkit.errors import UsageError
     "simulated",
     metavar="NAME",
     shell_complete=complete_sim_bench,
-    help="Simulated bench to start and show.",
+    help="Simulated bench to start; the page may move it.",
 )
-@click.option("--allow-motion", is_flag=True, help="The page may move the bench.")
+@click.option("--allow-motion", is_flag=True, help="The page may move the bench of --bench.")
 @own_effects_option()
 @click.option("--folder", default=".", show_default=True, help="Folder of the library view.")
 @click.option("--port", default=0, metavar="PORT", help="Port; a free one by default.")
@@ -90,7 +90,7 @@ def command(
             folder=folder,
             bench=bench,
             sim=simulated,
-            allow_motion=allow_motion,
+            allow_motion=allow_motion or simulated is not None,
             effects=effect_files,
             mystery=mystery,
             ready=lambda url: _ready(url, browser=not no_browser),

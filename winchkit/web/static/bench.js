@@ -61,6 +61,7 @@ function receive(message) {
   cut = false;
   picture = message;
   for (const [name, now] of Object.entries(message.status.winch || {})) {
+    now.gross = orders.grossOf(now.tension, message.status.tare && message.status.tare[name]);
     const rows = history[name] || (history[name] = []);
     if (!rows.length || rows.at(-1).time < time) rows.push({ ...now, time });
     while (rows.length && rows[0].time < time - 60) rows.shift();
@@ -125,7 +126,7 @@ const tripped = () => (picture && picture.status.tripped) || [];
 const now = () => (picture && picture.status.winch && picture.status.winch[winch]) || null;
 const commands = () => Boolean(picture && picture.you_command && !old());
 const moving = () => Object.values((picture && picture.status.winch) || {}).some((one) => one.phase !== "disabled");
-const tensions = () => orders.tensions(now() || { tension: null }, picture && picture.status.tare && picture.status.tare[winch]);
+const tensions = () => now() || { tension: null, gross: null };
 const tared = () => Boolean(picture && picture.status.tare && winch in picture.status.tare);
 export const attached = () => Boolean(declared);
 
@@ -255,7 +256,7 @@ function build() {
       el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused()) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
   fill(document.getElementById("stopbar"), jogButton(1), jogButton(-1), stopButton());
   if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
-  if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared);
+  if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared, picture && picture.status.tare && picture.status.tare[winch]);
   if (tab === "Bus frames") frames(document.getElementById("frames"));
   if (tab === "Drive objects") objects(document.getElementById("objects"), winch);
   drawnAt = 0;
@@ -411,10 +412,10 @@ function refresh() {
   if (drawnAt === picture.status.time && drawnAge === aged) return;
   drawnAt = picture.status.time; drawnAge = aged;
   values.dataset.time = drawnAt;
-  const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name, aged), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
-  const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, net = Boolean(tensions().gross !== null && picture.status.tare[winch]), winding = state.cable_speed === null ? null : -state.cable_speed;
+  const cell = (name, value, digits, unit, low, high, limits, at = value) => el("div", {}, el("span", { class: "note" }, name, aged), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(at, low, high, limits, unit));
+  const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, net = state.gross !== null && state.gross !== state.tension, winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
-  renew(values, cell(state.length_known === false ? `Cable length unknown: home the winch; ${own.unhomed ? "held jogs only" : "no jogs"}` : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
+  renew(values, cell(state.length_known === false ? `Cable length unknown: home the winch; ${own.unhomed ? "held jogs only" : "no jogs"}` : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${state.gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension, state.gross),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note", title: state.state }, [DRIVE[state.state] || state.state, by(state.commander)].filter(Boolean).join(" · "))));
   renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));

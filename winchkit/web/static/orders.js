@@ -25,13 +25,13 @@ export function move(speeds, start) {
 
 const newtons = (value) => (value === null ? "–" : `${number(value, 4)} N`);
 
-// Gross and net tension of a winch, N; null where they are not known.
-export const tensions = (state, tare) => ({ net: state.tension, gross: state.tension === null || tare === null || tare === undefined ? null : state.tension + tare });
+// Gross tension of a winch, on which its limits act, N; null where it is not known.
+export const grossOf = (net, tare) => net === null || tare === null || tare === undefined ? null : net + tare;
 
 // Asks for a tare, with the readings as they are while it asks.
 export function tare(winch, limits, read, start) {
   const known = limits.filter((limit) => limit !== null).map((limit) => `${number(limit, 3)} N`);
-  confirmed(`Tare winch ${winch}`, `The net tension counts from what hangs on the load cell now.${known.length ? ` The limit${known.length > 1 ? "s" : ""} of ${known.join(" and ")} then act${known.length > 1 ? "" : "s"} on the net value.` : ""}`, start,
+  confirmed(`Tare winch ${winch}`, `The net tension counts from what hangs on the load cell now.${known.length ? ` The limit${known.length > 1 ? "s" : ""} of ${known.join(" and ")} still act${known.length > 1 ? "" : "s"} on the gross value.` : ""}`, start,
     el("p", { id: "tensions", style: { marginTop: "8px" } }, readings(read())));
 }
 
@@ -40,4 +40,4 @@ export function renewTare(read) {
   if (shown) shown.textContent = readings(read());
 }
 
-const readings = ({ net, gross }) => `Now: gross ${newtons(gross)}, net ${newtons(net)}.`;
+const readings = ({ tension, gross }) => `Now: gross ${newtons(gross)}, net ${newtons(tension)}.`;

@@ -65,10 +65,10 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       return [now.rows.map((row) => row.time - end), ...columns];
     };
     const own = plot(host, data(), series, { height: axis ? 96 : 72, left: LEFT, names, unit: CHANNELS[names[0]].unit.split(",")[0], sync: "strips", label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
-    const top = names[0] === "tension" ? limits.tension : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
+    const lines = ({ gross, tension } = {}) => names[0] === "tension" ? limits.tension.map((v) => v === null ? null : v - ((gross ?? tension) - tension)) : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
     const beyond = last.parentElement.querySelector(".beyond");
     drawn.push(() => {
-      const next = data();
+      const next = data(), top = lines(kept.rows.at(-1));
       own.setData(next, false);
       own.setScale("x", { min: span[0], max: span[1] });
       const values = next[1].filter((v, i) => v !== null && next[0][i] >= span[0] && next[0][i] <= span[1]), away = top.filter((v) => v !== null && (!values.length || v > Math.max(...values) || v < Math.min(...values)));

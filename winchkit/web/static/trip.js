@@ -9,11 +9,12 @@ const LEFT = 52;
 // Of the chart's width, so that its text has one size on every screen.
 const scaleOf = (right) => (time) => LEFT + ((time - FROM) / (TO - FROM)) * (right - LEFT);
 
-export function trip(host, found, winch, declared) {
+// `tare`: gross less net tension, N; the limits act on the gross one, and the net one is drawn.
+export function trip(host, found, winch, declared, tare) {
   const own = found.winch[winch], limits = declared.winch[winch].limits, WIDTH = Math.max(300, Math.min(660, host.clientWidth)), RIGHT = WIDTH - 60, x = scaleOf(RIGHT), negated = (values) => values.map((v) => (v === null ? null : -v));
   const speed = negated(own.cable_speed), commanded = negated(own.commanded_speed);
   const parts = [svg("defs", {}, svg("pattern", { id: "forbidden", width: 6, height: 6, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("rect", { width: 2, height: 6, fill: "var(--stop)", opacity: 0.4 }))),
-    ...panel({ title: "Tension", unit: "N", top: 22, height: 130, times: found.time, curves: [[own.tension, "ink", 1.6]], limits: limits.tension, RIGHT, x }),
+    ...panel({ title: "Tension", unit: "N", top: 22, height: 130, times: found.time, curves: [[own.tension, "ink", 1.6]], limits: limits.tension.map((v) => v === null ? null : v - (tare || 0)), RIGHT, x }),
     ...panel({ title: "Speed", unit: "m/s, + winds in", top: 184, height: 80, times: found.time, curves: [[commanded, "with", 2.4, "5 3"], [speed, "ink", 1.6]], limits: [-limits.speed, limits.speed], RIGHT, x })];
   for (let t = FROM; t <= TO + 1e-9; t += WIDTH < 500 ? 1 : 0.5) parts.push(svg("text", { x: x(t), y: 284, "text-anchor": "middle", fill: "var(--muted)" }, `${number(t)}${t + (WIDTH < 500 ? 1 : 0.5) > TO ? " s" : ""}`));
   parts.push(svg("line", { x1: x(0), x2: x(0), y1: 22, y2: 264, stroke: "var(--stop)", "stroke-width": 1.5 }));

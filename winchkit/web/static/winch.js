@@ -36,7 +36,7 @@ export function picture(name, own, state, drum, tripped) {
   parts.push(svg("line", { x1: cx, y1: cy, x2: cx + 0.75 * r0 * Math.cos(turn), y2: cy - 0.75 * r0 * Math.sin(turn), stroke: "var(--ink2)", "stroke-width": 4 }), svg("circle", { cx, cy, r: 6, fill: "var(--ink2)" }));
   if (sense) { const q = 0.6 * r0, tip = cx + sense * q; parts.push(svg("path", { d: `M${cx - sense * q} ${cy + 6}A${q} ${q} 0 0 ${sense > 0 ? 0 : 1} ${tip} ${cy + 6}`, fill: "none", stroke: "var(--ink)", "stroke-width": 1.6 }), svg("path", { d: `M${tip - 5} ${cy + 9}L${tip} ${cy - 1}L${tip + 5} ${cy + 9}z`, fill: "var(--ink)" })); }
   // The cable over the pulleys to the load.
-  const stops = [{ at: centre, r: wound }, ...wheels], last = stops.at(-1), xLoad = last.at[0] + last.r, load = Math.max(at, last.at[1] + 48), width = state.tension === null ? 1.5 : 1.5 + 3 * Math.min(1, Math.max(0, state.tension / (own.limits.tension[1] || 500)));
+  const stops = [{ at: centre, r: wound }, ...wheels], last = stops.at(-1), xLoad = last.at[0] + last.r, load = Math.max(at, last.at[1] + 48), width = state.gross === null ? 1.5 : 1.5 + 3 * Math.min(1, Math.max(0, state.gross / (own.limits.tension[1] || 500)));
   let path = "";
   for (let i = 0; i + 1 < stops.length; i++) { const [from, to] = tangent(stops[i].at, stops[i].r, stops[i + 1].at, stops[i + 1].r); path += `${i ? `A${stops[i].r} ${stops[i].r} 0 0 1 ` : "M"}${from.join(" ")}L${to.join(" ")}`; }
   path += `${path ? `A${last.r} ${last.r} 0 0 1 ` : "M"}${xLoad} ${last.at[1]}V${load}`;
@@ -73,13 +73,13 @@ export const lengthOf = (state) => state.length_known === false ? "length unknow
 // A card of one winch among several: a small picture, state and values; a click enlarges it.
 export function card(name, own, state, drum, tripped, chosen, choose) {
   const limits = own.limits.length || [0, 5], most = limits[1] * 1.06, x = (v, top) => `${Math.max(0, Math.min(100, (v / top) * 100)).toFixed(1)}%`, high = own.limits.tension[1] || 500;
-  const bar = (value, top, [low, up], unit, digits) => el("span", { class: "bar" }, svg("svg", { width: "100%", height: 10, "aria-hidden": "true" }, svg("rect", { y: 3, width: "100%", height: 5, fill: "var(--band)" }),
+  const bar = (value, top, [low, up], unit, digits, at = value) => el("span", { class: "bar" }, svg("svg", { width: "100%", height: 10, "aria-hidden": "true" }, svg("rect", { y: 3, width: "100%", height: 5, fill: "var(--band)" }),
     low ? svg("rect", { y: 2, width: x(low, top), height: 7, fill: "url(#hatch)" }) : null, up ? svg("rect", { x: x(up, top), y: 2, width: `${100 - parseFloat(x(up, top))}%`, height: 7, fill: "url(#hatch)" }) : null,
-    value === null ? null : svg("rect", { x: `calc(${x(value, top)} - 1px)`, width: 2, height: 10, fill: "var(--ink)" })), el("b", {}, value === null ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, ` ${unit}`)));
+    at === null ? null : svg("rect", { x: `calc(${x(at, top)} - 1px)`, width: 2, height: 10, fill: "var(--ink)" })), el("b", {}, value === null ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, ` ${unit}`)));
   const full = own.drum.turns || Math.max(1, drum.turns || 1), share = Math.max(0, Math.min(1, (drum.turns || 0) / full));
   return el("button", { class: `winch ${chosen ? "chosen" : ""}`, "aria-pressed": String(chosen), onclick: choose },
     svg("svg", { viewBox: "0 0 40 40", width: 40, height: 40, "aria-hidden": "true" }, svg("circle", { cx: 20, cy: 20, r: 18, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: 20, cy: 20, r: 10 + 7 * share, fill: "none", stroke: "var(--with)", "stroke-width": 2 }),
       svg("line", { x1: 20, y1: 20, x2: 20 + 10 * Math.cos((state.motor_angle || 0) / (own.ratio || 1)), y2: 20 - 10 * Math.sin((state.motor_angle || 0) / (own.ratio || 1)), stroke: "var(--ink2)", "stroke-width": 3 })),
     el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), state.commander ? el("small", {}, `by ${state.commander}`) : null),
-    el("span", { class: "bars" }, state.length_known === false ? el("small", {}, lengthOf(state)) : bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
+    el("span", { class: "bars" }, state.length_known === false ? el("small", {}, lengthOf(state)) : bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0, state.gross), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
 }
