@@ -130,6 +130,14 @@ def test_a_refused_request_is_seen_at_once(page: Any, view: str, dialog: bool) -
     assert page.locator(".alert").count() == 0
 
 
+def test_what_an_order_of_a_dialog_refused_ends_with_the_dialog(page: Any) -> None:
+    show(page, "library", dialog=True)
+    page.evaluate(ASKED, ["/api/nowhere", None, {}])
+    assert page.locator("#dialog .alert").count() == 1
+    page.keyboard.press("Escape")
+    until(page, lambda: page.locator(".alert").count() == 0)
+
+
 @pytest.mark.parametrize("view", VIEWS)
 def test_refused_work_is_seen_in_every_view(page: Any, view: str) -> None:
     for dialog in (False, True):

@@ -180,7 +180,7 @@ function recording(chip, log) {
   fill(chip, ...(log ? [el("i", {}, "●"), `${log.file} ${time}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}`] : []));
   chip.hidden = !log;
   if (logged && !log) {
-    alarm(`Recorded: ${logged.path}, ${logged.rows ?? "no"} rows.`, "recorded");
+    alarm(`Recorded: ${logged.path}, ${logged.rows ?? "no"} rows.`, "recorded", () => true, "done");
     logName = logged.file.replace(/(?:-(\d+))?(\.\w+)$/, (all, count, suffix) => `-${Number(count || 1) + 1}${suffix}`);
     const field = document.querySelector(".context input.file");
     if (field) field.value = logName;

@@ -131,12 +131,12 @@ const messages = new Map(), AT_ONCE = 1000;
 
 // `holds` says whether the message is still true. A message that repeats is shown anew, with its time;
 // the answers to orders that were under way together count once.
-export function alarm(text, cause = "order", holds = () => true) {
+export function alarm(text, cause = "order", holds = () => true, kind = "") {
   const before = messages.get(cause), now = performance.now();
   if (before && before.text === text && now - before.at < AT_ONCE) return;
   if (before) { before.node.remove(); messages.delete(cause); }
   if (!text) return;
-  const node = el("div", { class: "alert", role: "alert" }, el("div", {}, text), el("span", { class: "note" }, new Date().toTimeString().slice(0, 8)), el("button", { class: "plain", onclick: () => alarm("", cause) }, "Close"));
+  const node = el("div", { class: `alert ${kind}`, role: "alert" }, el("div", {}, text), el("span", { class: "note" }, new Date().toTimeString().slice(0, 8)), el("button", { class: "plain", onclick: () => alarm("", cause) }, "Close"));
   messages.set(cause, { text, node, holds, at: now });
   place();
 }
@@ -156,7 +156,7 @@ export function dialog(title, ...content) {
   fill(box, el("div", { class: "row", style: { marginBottom: "12px" } }, el("h2", {}, title),
     el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
   box.setAttribute("aria-label", title);
-  box.onclose = () => { place(); if (before && before.focus) before.focus(); };
+  box.onclose = () => { if (box.contains((messages.get("order") || {}).node || null)) alarm(""); place(); if (before && before.focus) before.focus(); };
   if (!box.open) box.show();
   place();
   (box.querySelector("select, input, .primary") || box.querySelector("button")).focus();

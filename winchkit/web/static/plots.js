@@ -20,8 +20,8 @@ const power = (tick) => tick >= 0.01 && tick <= 1000 ? number(tick) : `10${Strin
 
 // Ticks with the decimals of their step; steps below 0.001 as powers of ten, which stay short.
 function steps(ticks) {
-  const known = ticks.filter((tick) => tick !== null), step = known.length > 1 ? Math.abs(known[1] - known[0]) : 1, exponent = Math.floor(Math.log10(step) + 1e-9);
-  const least = exponent < -3 && Math.max(...known.map(Math.abs)) < 0.01, of = (tick) => (least && tick ? `${number(tick / 10 ** exponent, 3)}·${power(10 ** exponent)}` : String(Number(tick.toFixed(Math.max(0, -exponent)))).replace("-", "−"));
+  const known = ticks.filter((tick) => tick !== null), step = known.length > 1 ? Math.abs(known[1] - known[0]) : 1, exponent = Math.floor(Math.log10(step) + 1e-9), more = Math.abs((step / 10 ** exponent) % 1 - 0.5) < 0.01 ? 1 : 0; // steps of 2.5
+  const least = exponent < -3 && Math.max(...known.map(Math.abs)) < 0.01, of = (tick) => (least && tick ? `${number(tick / 10 ** exponent, 3)}·${power(10 ** exponent)}` : String(Number(tick.toFixed(Math.max(0, more - exponent)))).replace("-", "−"));
   return ticks.map((tick) => (tick === null ? "" : of(tick)));
 }
 
