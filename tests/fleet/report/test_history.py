@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from report_parsed import HOSTILE, Page
 from winchkit.fleet.diagnosis.history import FleetHistory, fleet_history
 from winchkit.fleet.diagnosis.sessions import SessionEstimate
 from winchkit.fleet.report.history import fleet_history_html
+from winchkit.fleet.report.text import odd_texts
 
 WEEK = 7 * 86400.0
 STD = 1e-4
@@ -43,3 +45,12 @@ def test_no_change_has_no_table_and_names_stay_text() -> None:
     hostile = Page(fleet_history_html(history(0.02, 0.0, HOSTILE), HOSTILE))
     plain = Page(fleet_history_html(history(0.02, 0.0), "fleet"))
     assert hostile.count("script") == plain.count("script")
+
+
+def test_a_winch_stands_beside_the_mean_of_the_others() -> None:
+    (parameter,) = history(0.02, 0.0).parameters
+    winch = next(one for one in parameter.winches if one.winch == "C")
+    line, _ = odd_texts(parameter, winch)
+    own, others = line.partition("gain_error")[2].split(", the others ")
+    assert float(own.split()[0]) == pytest.approx(3.0, abs=0.02), "per cent: 0.01 and 0.02"
+    assert float(others.split()[0]) == pytest.approx(1.0, abs=0.02), "all of them have 0.01"

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import isfinite
 
+import numpy as np
+
 from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
+from winchkit.fleet.diagnosis.partial_pooling import partial_pooling
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
 from winchkit.model.stages import RESULT_UNITS
 from winchkit.quantity_text import quantity, scale_for, with_std
@@ -111,7 +114,9 @@ def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
 def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
     """Two lines of a winch that differs from the others."""
     own = _value(winch.value, winch.std, parameter)
-    others = _value(parameter.common, parameter.common_std, parameter)
+    rest = [(one.value, one.std) for one in parameter.winches if one is not winch]
+    common = partial_pooling(*np.array(rest).T)
+    others = _value(common.common, common.common_std, parameter)
     name = f"{parameter.effect} {parameter.parameter}"
     yield f"winch {winch.winch} differs from the others: {name} {own}, the others {others}"
     yield (
