@@ -21,7 +21,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
 from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.lack_of_fit import lack_of_fit_test
+from winchkit.diagnosis.regression.lack_of_fit import lack_of_fit_test, output_p_values
 from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats
 from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -105,6 +105,37 @@ class TestLackOfFit:
             p_values.append(lack_of_fit_test(regression, residual, none, noise).p_value)
         for level in (0.02, 0.05, 0.2):
             assert no_more_than(int(np.count_nonzero(np.array(p_values) < level)), cases, level)
+
+    @pytest.mark.parametrize("slope", [0.0, 1.0], ids=["white", "low"])
+    def test_the_whole_power_of_noise_is_rejected_no_more_often_than_the_level(
+        self, regression: TimeSeriesRegression, slope: float
+    ) -> None:
+        """Also where nearly all of it lies in the lowest bands, of few degrees of freedom."""
+        cases, none = 300, np.zeros((regression.n_rows, 0))
+        size = (1.0 + regression.band_of_row) ** -slope
+        p_values, ratios = [], []
+        for residual in residuals(regression, cases, 6):
+            noise = noise_from_repeats(regression, residual * size, none)
+            p_values.append(output_p_values(regression, residual * size, none, noise))
+            ratios.append(
+                np.sum((residual * size) ** 2) / np.sum(noise.power[regression.band_of_row])
+            )
+        found = np.array([p["cable_length"] for p in p_values])
+        for level in (0.01, 0.05, 0.2):
+            assert no_more_than(int(np.count_nonzero(found < level)), cases, level)
+        if slope:
+            assert np.mean(np.sqrt(ratios) > 1.1) > 0.02, "the ratio of two rms values says little"
+
+    def test_a_wave_in_all_repeats_is_beyond_the_noise(
+        self, regression: TimeSeriesRegression
+    ) -> None:
+        none = np.zeros((regression.n_rows, 0))
+        row = regression.segments[0].rows.start + 20
+        (residual,) = residuals(regression, 1, 7)
+        for segment in regression.segments:
+            residual[segment.rows.start + row - regression.segments[0].rows.start] += 12.0
+        noise = noise_from_repeats(regression, residual, none)
+        assert output_p_values(regression, residual, none, noise)["cable_length"] < 1e-3
 
 
 class TestSignedRanks:

@@ -119,6 +119,8 @@ class OutputFit:
     noise_source: str = "repeats"
     noise_upper: float | None = None
     """Without repeats: the whole residual, an upper bound."""
+    p_value: float | None = None
+    """Probability of as large a misfit by the noise of the repeats alone."""
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,14 @@ def test_the_share_of_the_excess_decides(after: float, steps: int, verdict: str)
     assert told(outputs, steps=steps) == verdict
 
 
+@pytest.mark.parametrize(("p_value", "verdict"), [(0.01, "adequate"), (1e-4, "unknown")])
+def test_an_error_that_repeats_cannot_distinguish_from_their_noise_is_noise(
+    p_value: float, verdict: str
+) -> None:
+    error = replace(output(1.2, 1.2), p_value=p_value)
+    assert told({"tension": error}, steps=0) == verdict
+
+
 def told(outputs: Mapping[str, OutputFit], **changed: Any) -> str:
     """Verdict of a decision in which every output varies and none refutes the model."""
     usual: dict[str, Any] = {

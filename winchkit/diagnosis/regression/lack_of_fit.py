@@ -1,7 +1,7 @@
 """Lack-of-fit test: residual power of the replicate means against the pure-error power, by band.
 
 The F test of Draper & Smith (Applied Regression Analysis, ch. 2) in every noise band, with
-Bonferroni's correction for the number of bands.
+Bonferroni's correction for the number of bands, and of the whole power of an output.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from winchkit.diagnosis.regression.projection import orthonormal
 
 BAND_LEVEL = 0.05
 """Level of the rejection of a band, Bonferroni over all bands."""
+_DRAWS = 5000
+"""Draws of the whole power of an output; computing cost: five beyond a level of 0.1 %."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +65,42 @@ def lack_of_fit_test(
     if not noise.from_repeats:
         nothing = np.zeros(count)
         return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
+    total, dof = _power_of_means(regression, residual, jacobian, noise)
+    p = np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power))
+    tested = max(count, 1)
+    worst = float(min(1.0, p.min() * tested)) if count else 1.0
+    return LackOfFitTest(worst, total / noise.power - dof, p * tested < BAND_LEVEL)
+
+
+def output_p_values(
+    regression: Regression, residual: Array, jacobian: Array, noise: BandNoise
+) -> dict[str, float]:
+    """Probability of as large a misfit of each output by the noise alone, given its repeats.
+
+    The smaller one of two p-values, times two: that of the band with the largest F, and that of the
+    sum of squares over all bands, σ̂_b² ν_b F(ν_b, ν̂_b). Coloured noise has most of its power in
+    bands with few degrees of freedom: there the ratio of two rms values says little.
+    """
+    total, dof = _power_of_means(regression, residual, jacobian, noise)
+    p, size = np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power)), noise.power * dof
+    out = {}
+    for output in regression.outputs:
+        own = np.array([band[0] == output for band in regression.bands])
+        draws = np.random.default_rng(1).f(dof[own], noise.dof[own], (_DRAWS, own.sum()))
+        beyond = float(np.mean(draws @ size[own] >= total[own].sum()))
+        out[output] = min(1.0, 2 * min(float(p[own].min() * own.sum()), beyond))
+    return out
+
+
+def _power_of_means(
+    regression: Regression, residual: Array, jacobian: Array, noise: BandNoise
+) -> tuple[Array, Array]:
+    """Sum of squares of the means of repeats, and its degrees of freedom, by band."""
+    count = len(regression.bands)
     split = replicate_contrasts(regression, residual)
     total = sums_per_band(split.mean**2, split.mean_band, count)
     dof = sums_per_band(split.mean_share, split.mean_band, count)
     basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
     # Each fitted unknown takes degrees of freedom in proportion to its leverage.
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
-    dof = np.maximum(dof - taken, 1.0)
-    ratio = total / dof / noise.power
-    p = np.asarray(fdtrc(dof, noise.dof, ratio))
-    tested = max(count, 1)
-    worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return LackOfFitTest(worst, total / noise.power - dof, p * tested < BAND_LEVEL)
+    return total, np.maximum(dof - taken, 1.0)

@@ -13,7 +13,11 @@ from winchkit.diagnosis.regression.cross_validation import extrapolation, held_o
 from winchkit.diagnosis.regression.discretization import without_discretization_error
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
+from winchkit.diagnosis.regression.lack_of_fit import (
+    LackOfFitTest,
+    lack_of_fit_test,
+    output_p_values,
+)
 from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -107,15 +111,22 @@ class TimeSeriesSelection(SelectionEngine):
 
     def _test_lack_of_fit(self, present: Fit, noise: BandNoise) -> LackOfFitTest:
         """F test of the residual without the part that the discretisation error explains."""
-        left = without_discretization_error(
-            self.regression, present, noise.inverse_sigma(self.regression)
-        )
+        left = self._sampled_well(present, noise)
         return lack_of_fit_test(self.regression, left, present.jacobian, noise)
+
+    def p_values(self, fitted: Fit, noise: BandNoise) -> dict[str, float]:
+        """Probability of as large a misfit of each output by the noise of the repeats alone."""
+        left = self._sampled_well(fitted, noise)
+        return output_p_values(self.regression, left, fitted.jacobian, noise)
+
+    def _sampled_well(self, fitted: Fit, noise: BandNoise) -> Array:
+        """Residual without the part that the discretisation error explains."""
+        weights = noise.inverse_sigma(self.regression)
+        return without_discretization_error(self.regression, fitted, weights)
 
     def discretization_power(self, fitted: Fit, noise: BandNoise) -> dict[str, float]:
         """Decrease of each output's mean square without the discretisation error."""
-        regression = self.regression
-        left = without_discretization_error(regression, fitted, noise.inverse_sigma(regression))
+        regression, left = self.regression, self._sampled_well(fitted, noise)
         explained = fitted.residual**2 - left**2
         return {
             output: max(

@@ -30,7 +30,7 @@ from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
-from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.model.stages import OUTPUT_UNITS
 
 _EXPLAINED, MOSTLY = 0.1, 0.5
@@ -38,6 +38,9 @@ _EXPLAINED, MOSTLY = 0.1, 0.5
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
 _NOISY = 0.1
 """Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
+_CHANCE = 0.001
+"""Probability above which a misfit is noise, whatever its size; convention: of 80 sessions of the
+shipped spiral bench, which have no effect, seven have an output above 1.1 times its noise."""
 _STANDS = 3.0
 """Error of the file's model over the noise from which an output that does not vary is no measured
 one: an effect at the noise can cancel a variation by chance."""
@@ -79,8 +82,14 @@ def verdict_of(
 
 
 def is_at_noise(output: OutputFit) -> bool:
-    """Whether the final model's held-out error is as small as the noise, in ratio ``AT_NOISE``."""
-    return output.noise_rms is not None and output.heldout_rms_after <= AT_NOISE * output.noise_rms
+    """Whether the final model's held-out error is as small as the noise.
+
+    In ratio ``AT_NOISE``, or as far as the repeats say what their noise is.
+    """
+    if output.noise_rms is None:
+        return False
+    by_chance = output.p_value is not None and output.p_value > _CHANCE
+    return by_chance or output.heldout_rms_after <= AT_NOISE * output.noise_rms
 
 
 def remaining_share(outputs: Mapping[str, OutputFit]) -> float:
@@ -188,7 +197,7 @@ def _is_larger(losses: Array) -> bool:
 
 
 def output_fits(
-    engine: SelectionEngine,
+    engine: TimeSeriesSelection,
     initial_model: tuple[Fit, BandNoise],
     final: tuple[Fit, BandNoise],
     folds: Folds | None = None,
@@ -198,7 +207,6 @@ def output_fits(
     ``folds``: None for those that suit the final fit. Returns: by output; rms in SI.
     """
     regression, folds = engine.regression, folds or engine.folds(*final)
-    assert isinstance(regression, TimeSeriesRegression)
     noise, leakage = final[1], StopBandLeakage(regression)
 
     def errors(model: tuple[Fit, BandNoise]) -> tuple[dict[str, float], ...]:
@@ -211,6 +219,7 @@ def output_fits(
     after, held_after, leakage_after = first if final is initial_model else errors(final)
     noise_leakage = leakage.noise(final[0].hypothesis)
     known = noise.from_repeats
+    p_values = engine.p_values(*final) if known else {}
     size = noise.rms if known else white_noise(regression, final[0].residual)
     if any(held_after[output] > AT_NOISE * size[output] for output in size):
         # What coarse samples of a fast motion add to the error is known, and no effect.
@@ -232,6 +241,7 @@ def output_fits(
             noise_upper=None
             if known
             else _with(max(after[output], size[output]), leakage_after.get(output)),
+            p_value=p_values.get(output),
         )
         for output in regression.outputs
     }
