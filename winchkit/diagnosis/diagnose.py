@@ -420,6 +420,7 @@ def _steps(
         return
     final, noise = result.final, result.noise
     folds, first = engine.folds(final, noise), engine.n_initial_terms
+    known_to = noise.uncertainty(engine.regression) if noise.from_repeats else None
     standings: list[Standing] = []
     counted = {name: output for name, output in outputs.items() if name in known.deciding}
     mostly = remaining_share(counted) <= MOSTLY
@@ -429,15 +430,12 @@ def _steps(
         errors = engine.held_out_errors(without, noise, folds)
         # The torque has every error of the tension: what is left there may be the cause of both.
         upstream = {"tension"} if own == {"motor_torque"} else set[str]()
-        standing = standing_of(errors, outputs, sorted(own | upstream))
-        trusted = bool(known.deciding & own) and not known.refuted & own
-        standings.append(
-            replace(
-                standing,
-                certain=standing.certain and trusted and mostly,
-                rounded=_rounded_law(engine, result, first + place, outputs, standing),
-            )
+        trusted = mostly and bool(known.deciding & own) and not known.refuted & own
+        standing = standing_of(
+            errors, outputs, sorted(own | upstream), trusted=trusted, spread=known_to
         )
+        rounded = _rounded_law(engine, result, first + place, outputs, standing)
+        standings.append(replace(standing, rounded=rounded))
     for place, step in enumerate(steps_of(engine, result, sets, engine.regression.dataset, spread)):
         beside = [one for one, there in zip(standings, acts, strict=True) if there & acts[place]]
         yield with_standing(

@@ -15,6 +15,7 @@ from winchkit.diagnosis.diagnose import _unless_at_noise as unless_at_noise
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.steps import standing_of
 from winchkit.diagnosis.verdict.decision import verdict_of as decided
 from winchkit.effects.term import Term
 from winchkit.report.text import report_text
@@ -264,3 +265,25 @@ def test_an_addition_where_the_profile_leaves_no_error_above_the_noise_is_no_fin
     known = replace(found, initial_model=found.final, initial_noise=noise)
     other = replace(known, final=found.initial_model)
     assert unless_at_noise(answer.engine, other).final is found.final
+
+
+@pytest.mark.parametrize(
+    ("after", "p_value", "spread", "remaining"),
+    [
+        (1.01, 0.5, 0.05, ""),
+        (1.6, 0.5, 0.05, "more than a tenth"),
+        (1.2, 0.5, 1.5, "not known to a tenth"),
+        (1.2, 1e-3, 0.05, "may be another one"),
+        (1.02, 1e-3, 0.05, ""),
+    ],
+)
+def test_a_step_is_certain_where_what_it_leaves_is_known_to_be_little(
+    after: float, p_value: float, spread: float, remaining: str
+) -> None:
+    """The error without the step is 4 times the noise: it explains 15 times its power."""
+    outputs = {"tension": OutputFit("N", None, 9.0, 4.0, after, 4.0, after, 1.0, p_value=p_value)}
+    found = standing_of(
+        {"tension": 4.0}, outputs, ["tension"], trusted=True, spread={"tension": spread}
+    )
+    assert (remaining in found.remaining) if remaining else not found.remaining
+    assert standing_of({"tension": 4.0}, outputs, ["tension"], trusted=False).remaining

@@ -41,19 +41,18 @@ def refitted_steps(
         if all(errors[name] <= error / RELEVANT_RATIO for name, error in now.items()):
             continue
         term, values = fitted[index]
-        standing = standing_of(errors, outputs, term.effect.outputs)
+        standing = standing_of(errors, outputs, term.effect.outputs, trusted=True)
         if not standing.explained > 0.0:
             continue  # within the noise both values are right
         gain = 1 - min(now[name] / errors[name] for name in now if errors[name]) ** 2
-        what = "the error left is more than a tenth of what its new value explains"
         yield Step(
             (term.effect.id,),
             {term.effect.id: values},
             gain,
             place=tuple(Place(*at) for at in term.effect.place),
-            certain=standing.certain,
+            certain=not standing.remaining,
             share=standing.share,
-            doubts=() if standing.certain else (Doubt("remaining", what),),
+            doubts=(Doubt("remaining", standing.remaining),) if standing.remaining else (),
             refitted=True,
             file_values={name: old.values[name] for name in values},
         )

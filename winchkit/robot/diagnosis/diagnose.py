@@ -300,9 +300,8 @@ def _standing(selection: RobotSelection, without: FittedModel, acts: Sequence[st
     """What the model without a step says of it; ``acts`` are the outputs of the step."""
     # The tensions of a hanging platform are among the equations of its lengths.
     own = [name for name in acts if name in selection.in_noise] or list(selection.in_noise)
-    standing = standing_of(errors_in_noise(without), selection.in_noise, own)
     trusted = bool(selection.deciding.intersection(own)) and not selection.refuted
-    return replace(standing, certain=standing.certain and trusted)
+    return standing_of(errors_in_noise(without), selection.in_noise, own, trusted=trusted)
 
 
 def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
