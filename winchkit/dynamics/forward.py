@@ -194,10 +194,8 @@ def setup_of(
     *,
     is_torque: bool,
 ) -> Setup:
-    """The setup of a run whose torque drives the motor, or whose motion the loops follow.
-
-    Raises RunError as :func:`forward`.
-    """
+    """The setup of a run whose torque drives the motor, or whose motion the loops follow; raises
+    RunError as :func:`forward`."""
     require_type(run, Run, "torque" if is_torque else "reference")
     run = driving_part(run, profile, is_torque=is_torque)
     time = run.time
@@ -233,11 +231,9 @@ def setup_of(
 
 
 def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
-    """The part of a run with what drives a simulation, in the channels of the model.
-
-    From the first to the last sample at which all of it is known; short gaps between are straight
-    lines. Raises RunError for fewer than two samples and for a longer gap.
-    """
+    """The part of a run with what drives a simulation, in the channels of the model, from the first
+    to the last sample at which all is known; short gaps are straight lines. Raises RunError for
+    fewer than two samples and for a longer gap."""
     (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     used = {_driving(run, is_torque=is_torque), "motor_angle", "motor_velocity"}
     if not isinstance(profile, AxisProfile) and run.load_mass is None:

@@ -113,31 +113,13 @@ def refit_to_motion(
     terms: Sequence[Term],
     progress: Callable[[int], None] = lambda step: None,
 ) -> MotionFit:
-    """Refit effects so that the measured torque makes the measured motion.
+    """Refit effects, from the values of ``terms``, so that the measured torque makes the measured
+    motion; ``progress`` is called with the number of the step.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs with motor angle and torque.
-    profile : WinchProfile
-        The winch or the axis.
-    terms : sequence of Term
-        All its effects, at the values from which the fit starts.
-    progress : callable
-        Called with the number of the fit's step.
-
-    Raises
-    ------
-    RunError
-        For a run without angle or torque, or with missing values.
-    UsageError
-        For effects without a step, and a motion that cannot be simulated, as :func:`forward`; where
-        no effect acts on the motion.
-
-    Notes
-    -----
-    Least squares of the position over all pieces. The standard deviations allow for errors that
-    are correlated within a piece (cluster-robust covariance).
+    Least squares of the position over all pieces. The standard deviations allow for errors that are
+    correlated within a piece (cluster-robust covariance). Raises RunError for a run without angle
+    or torque, or with missing values; UsageError for effects without a step, where none acts on the
+    motion, and as :func:`forward`.
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")

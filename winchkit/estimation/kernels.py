@@ -45,10 +45,8 @@ class Kernels:
 
 
 def _slopes(force: float, new: float, limit: float, reach: float, shape: float) -> Any:
-    """Derivatives of the exact step's result by F, by F_c, by q and by β, for forward motion.
-
-    ``reach`` q = σ|dx|/F_c; forces are positive along the motion, so that u = 1 − F/F_c.
-    """
+    """Derivatives of the exact step's result by F, by F_c, by ``reach`` q = σ|dx|/F_c and by β;
+    forces are positive along the motion, so that u = 1 − F/F_c."""
     u, w = 1.0 - force / limit, 1.0 - new / limit
     near, far = abs(u), abs(w)
     if near == 0.0 or far == 0.0:

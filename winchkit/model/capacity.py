@@ -43,13 +43,9 @@ class Capacity:
 
 
 def capacity(profile: WinchProfile) -> Capacity:
-    """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``.
+    """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``; NaN where neither
+    is declared.
 
-    ``profile``: its drum declares ``width`` (grooved) or ``flange_radius`` (layered), m. Returns:
-    NaN where the dimension is not declared.
-
-    Notes
-    -----
     A grooved drum holds width/pitch turns in one layer (Eq. 12 of the winding-device paper). On a
     layered drum every turn lies on the one before; the cable's outer side may reach the flange.
     """
@@ -114,12 +110,8 @@ def length_at(profile: WinchProfile, turns: float) -> float:
 
 
 def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
-    """Free cable lengths between a full drum and the last two dead wraps, m.
-
-    ``profile``: with ``reference.cable_length``, m, and ``reference.wound_turns``. Returns: m;
-    ``shortest`` is NaN where neither width nor flange is declared, both are NaN without a
-    reference.
-    """
+    """Free cable lengths between a full drum and the last two dead wraps, m; NaN where no
+    dimension, or no reference, is declared."""
     return length_at(profile, capacity(profile).turns), length_at(profile, DEAD_WRAPS)
 
 
@@ -135,11 +127,8 @@ def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
 def drum_warnings(
     profile: WinchProfile, shortest: float | None = None, longest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Warnings about ends of the stroke that exceed the drum's capacity.
-
-    ``profile``: without ``reference.wound_turns`` there are no warnings. ``shortest``, ``longest``:
-    free lengths to which the winch may move, m; by default that of the reference.
-    """
+    """Warnings about ends of the stroke, by default the reference, that exceed the drum's capacity;
+    none without ``reference.wound_turns``."""
     reference = profile.reference
     if not reference.wound_turns:
         return

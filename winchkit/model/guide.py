@@ -96,11 +96,9 @@ def guide_of(profile: WinchProfile) -> Guide:
 def guide_warnings(
     profile: WinchProfile, shortest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Warnings about a fleet angle beyond the limit on a grooved drum.
-
-    ``profile``: its guide is assumed to be above the cable on an empty drum. ``shortest``: shortest
-    free length of the winch, m; by default that of a full drum, else the reference.
-    """
+    """Warnings about a fleet angle beyond the limit on a grooved drum, down to the ``shortest``
+    free length, by default of a full drum; the guide is assumed to be above the cable on an empty
+    drum."""
     if profile.guide is None or not profile.drum.groove_pitch:
         return
     guide, limit = guide_of(profile), float(FLEET_LIMIT["grooved"])

@@ -72,10 +72,8 @@ class Line:
         return value
 
     def _force(self, force: Any, at: At) -> Any:
-        """Cable force from the one that the runs state or, where none is, from the cell's reading.
-
-        Effects of the cell are undone, the last first.
-        """
+        """Cable force from the one that the runs state or, where none is, from the cell's reading,
+        of which the cell's effects are undone, the last first."""
         if not at.reads_cell:
             return self._through(Stage.LOAD, force, at)
         for modifier in reversed(self._stages.get(Stage.CELL, ())):
@@ -194,13 +192,11 @@ class Line:
         return length
 
     def _load(self, motion: Motion, kinematics: WinchKinematics) -> Array:
-        """Load of a known mass that moves with the cable, kinematic effects included.
-
-        The cable speed is the arm (m/rad) times the motor's rate, so that a ripple of the arm is
-        differentiated once only. Motions that do not pass through the arm, such as slip, are
-        differentiated from the length. The acceleration by the cable's strain is left out: it would
-        need the fourth derivative of the angle, which is mostly noise.
-        """
+        """Load of a known mass that moves with the cable, kinematic effects included. The speed is
+        the arm times the motor's rate, so that a ripple of the arm is differentiated once only;
+        motions that do not pass through the arm are differentiated from the length. The
+        acceleration by the cable's strain is left out: it would need the fourth derivative of the
+        angle, which is mostly noise."""
         load = motion.load
         assert load is not None
         if motion.load_mass is None or not any(m.stage <= Stage.WOUND for m in self.modifiers):
@@ -257,11 +253,9 @@ class Line:
         tension: Array,
         temperature: Array,
     ) -> At:
-        """Inputs of the modifiers for single samples without a time series, SI and degC, (n,).
-
+        """Inputs of the modifiers for single samples (n,) without a time series, SI and degC.
         Accelerations are zero, and directions smooth below the creep rates, so that a controller's
-        friction has no step at standstill.
-        """
+        friction has no step at standstill."""
         drum_angle, length = self._nominal_length(motor_angle)
         speed = self._nominal_arm(motor_angle) * motor_rate
         return At(
@@ -308,10 +302,8 @@ class Line:
         return np.asanyarray(profile.reference.motor_angle + turned)
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
-        """Motor angle at a cable length (m) under a tension (N), rad.
-
-        Closed form for the nominal line; with effects, Newton's method starting from it.
-        """
+        """Motor angle at a cable length (m) under a tension (N), rad; with effects by Newton's
+        method from the closed form of the nominal line."""
         angle = float(self.nominal_motor_angle(np.asarray(cable_length)))
         for _ in range(_NEWTON_STEPS if self.modifiers else 0):
             excess = self.cable_length(angle, tension) - cable_length

@@ -148,11 +148,8 @@ def _refuse_slope(slope: float, std: float) -> None:
 
 def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array, float]:
     """Coefficients with covariance, residuals (true less fitted) and their standard deviation.
-
     Raises RunError for a parabola that turns round within the loads.
 
-    Notes
-    -----
     Gauss-Newton on the readings: minimises Σ (x − g(y))², with g the inverse of the polynomial,
     from the regression of y on x; covariance s² (JᵀJ)⁻¹, ∂g/∂cₖ = −gᵏ/p'(g).
     """

@@ -118,10 +118,8 @@ class Health:
 
 
 def examine(samples: CellSamples) -> Health:
-    """Health of a load cell.
-
-    ``samples``: a few seconds of readings. Raises RunError for fewer than 20 usable readings.
-    """
+    """Health of a load cell by a few seconds of readings; raises RunError for fewer than 20 usable
+    ones."""
     good = samples.usable & np.isfinite(samples.value)
     if int(good.sum()) < _FEWEST:
         raise RunError(
@@ -314,10 +312,7 @@ def _alias(frequency: float, rate: float) -> str:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> CellSamples:
-    """Samples from rows of time, raw counts, value, usable, saturated.
-
-    ``rows`` (n, 5): time, s, raw counts, value, usable, saturated.
-    """
+    """Samples from rows (n, 5): time, s, raw counts, value, usable, saturated."""
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return CellSamples(
         time.astype(float),

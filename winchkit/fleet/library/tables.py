@@ -138,10 +138,8 @@ TABLES: Mapping[str, tuple[TableColumn, ...]] = {
 
 
 def arrow_schema(table: str) -> pa.Schema:
-    """Arrow schema of a table of the library; units are the metadata ``unit`` of a column.
-
-    Raises UsageError for an unknown table, or without pyarrow.
-    """
+    """Arrow schema of a table of the library; units are the metadata ``unit`` of a column. Raises
+    UsageError for an unknown table, or without pyarrow."""
     try:
         import pyarrow as pa
     except ImportError:

@@ -40,10 +40,8 @@ def require_within_limits(
     limits: Mapping[str, LimitSpec],
     wiring: RobotWiring,
 ) -> None:
-    """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit.
-
-    The message has the place on the path, the cable, its value and the limit.
-    """
+    """Raise NotPermitted, with the place on the path, where a motion, or a stop on its way, would
+    exceed a limit."""
     found = [
         *_length_faults(robot.names, planned, limits),
         *_rate_faults(robot.names, planned, limits),
@@ -117,10 +115,8 @@ def _rate_faults(
 def _force_faults(
     robot: Robot, planned: PlatformTrajectory, tension: ForceLimits, deceleration: float
 ) -> list[_Exceeded]:
-    """The planned motion at every sample, and a stop at up to 200 of them.
-
-    A hanging platform is planned at rest in each pose; its swinging in a stop is not known.
-    """
+    """The planned motion at every sample, and a stop at up to 200 of them. The swinging of a
+    hanging platform in a stop is not known."""
     out = []
     without = np.flatnonzero(~np.isfinite(planned.force).all(axis=1))
     if len(without):
@@ -148,10 +144,8 @@ def _force_faults(
 def _clearance_faults(
     robot: Robot, planned: PlatformTrajectory, wiring: RobotWiring
 ) -> list[_Exceeded]:
-    """Cables that come nearer to each other or to a body than the clearance, and than they are.
-
-    No point of the platform moves by more than a quarter of the clearance between two samples.
-    """
+    """Cables that come nearer to each other or to a body than the clearance, and than they are. No
+    point of the platform moves by more than a quarter of the clearance between two samples."""
     if wiring.clearance is None:
         return []
     count = ceil(4 * planned.path.length / wiring.clearance) + 1

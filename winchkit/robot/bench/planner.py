@@ -56,13 +56,10 @@ class Planner:
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> list[PlatformTrajectory]:
-        """Plan motions through waypoints and compare them with all limits.
-
-        ``waypoints``: poses to go to; the platform stops at each that is not blended. ``speed``,
-        ``acceleration``: of the platform, m/s and m/s²; by default the limits of ``[robot]``.
+        """Plan motions through waypoints, with a stop at each that is not blended, and compare them
+        with all limits; speed (m/s) and acceleration (m/s²) are by default those of ``[robot]``.
         Raises UsageError for what is no pose, or no number; NotPermitted for a limit that would be
-        exceeded on the way, or by a stop.
-        """
+        exceeded on the way, or by a stop."""
         for waypoint in waypoints:
             if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
                 raise UsageError("move: a pose with numbers that are not finite is no goal")

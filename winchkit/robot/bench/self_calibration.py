@@ -1,9 +1,8 @@
 """Calibration of a robot by its own bench: drive to poses, measure at rest, fit, validate.
 
-The procedure of the CABTIVE paper (Lessanibahri et al., section IV) in one call. Poses for the fit
-and for the validation are drawn at random in a box about home; each is planned, so that a pose that
-the cables cannot hold within the limits is drawn again. The platform stands still while the tracker
-and the load cells are averaged. Poses of the validation are never used in the fit.
+The procedure of the CABTIVE paper (Lessanibahri et al., section IV). Poses are drawn at random in a
+box about home; one that the cables cannot hold within the limits is drawn again. Poses of the
+validation are never used in the fit.
 
 Cables are moved by their lengths, so that errors of the geometry change the cable forces, the more
 the farther the platform is from where these were right: 1 mm of a steel cable of 20 N/mm are 20 N.
@@ -219,10 +218,7 @@ def recorded_poses(
     first: Run | None = None,
     session: str = "",
 ) -> Run:
-    """Measure poses, a row each.
-
-    ``rows``, iterator of (m,) arrays.
-    """
+    """Measure poses, a row each, beside those of ``first``."""
     lines = bench.robot.robot.names
     units = {
         **{f"{line}.motor_angle": "rad" for line in lines},
@@ -263,10 +259,8 @@ class _Driver:
         self._began = bench.clock.now()
 
     def refine(self, fit: Run, options: Options | None) -> None:
-        """Plan with the robot that fits the poses so far, and restore the preload.
-
-        Without a load cell at each winch that is left as it is.
-        """
+        """Plan with the robot that fits the poses so far, and restore the preload, where each winch
+        has a load cell."""
         found = self._compute(self._look, _refitted, self.bench.spec, fit, options)
         if found is not None:
             self._planner = replace(self._planner, robot=found)

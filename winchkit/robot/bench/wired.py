@@ -45,11 +45,9 @@ class RobotOfBench:
 
     @property
     def truth(self) -> PlatformTruth:
-        """The platform of a rehearsal, as the profile declares it.
-
-        Without a moment of inertia its mass is at the anchor points; cables without a stiffness
-        have one at which the middle of ``tension`` stretches them by half a per cent, as of fibre.
-        """
+        """The platform of a rehearsal, as the profile declares it. Without a moment of inertia its
+        mass is at the anchor points; cables without a stiffness have one at which the middle of
+        ``tension`` stretches them by half a per cent, as of fibre."""
         profile, wiring = self.robot.profile, self.wiring
         size = float(np.mean(np.sum(self.robot.geometry.anchor_point**2, axis=1)))
         inertia = profile.platform.inertia or (2 / 3 * size * self.mass,) * 3

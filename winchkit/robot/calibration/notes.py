@@ -122,10 +122,8 @@ def warnings_of(
     observed: Observability,
     unfound: int,
 ) -> tuple[str, ...]:
-    """What a fit leaves open: bounds, noise, and values that rest on the prior.
-
-    ``unfound``: held-out poses that were not found.
-    """
+    """What a fit leaves open: bounds, noise, values that rest on the prior, and ``unfound``
+    poses."""
     out = [*equations.measured.notes, *_left_out(equations)]
     out += outside_bounds(equations.parameters)
     if unfound:

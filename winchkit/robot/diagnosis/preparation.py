@@ -85,12 +85,9 @@ def estimated_noise(
 
 
 def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
-    """Whether the imbalance of the tensions is below 20 % of their standard deviation.
-
-    The imbalance is what no payload explains, nor the effect that explains most. Else an
-    unmodelled force acts on the platform, or the load cells do not measure these cables: the
-    balance is then left out, with a note.
-    """
+    """Whether the imbalance of the tensions that no payload explains, nor the effect that explains
+    most, is below 20 % of their standard deviation. Else an unmodelled force acts on the platform,
+    or the load cells do not measure these cables."""
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
@@ -204,11 +201,8 @@ class Preparation:
         return chi_square[0] - chi_square[1]
 
     def geometry_is_significant(self, gain: float) -> bool:
-        """F test of the decrease of χ² by the geometry.
-
-        F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level
-        0.1 %.
-        """
+        """F test, level 0.1 %, of the decrease of χ² by the k numbers of the geometry: F =
+        Δχ²/k."""
         count, dof = (
             int(np.count_nonzero(self.prior.lasting)),
             self.noise.dof.get("cable_length", 1.0),
@@ -216,11 +210,8 @@ class Preparation:
         return gain / count > float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
 
     def with_guess(self) -> Preparation:
-        """The same with the effect that explains most beside a free geometry, and its noise.
-
-        A geometry fitted without the missing effect may be millimetres off, too far for a linear
-        model.
-        """
+        """The same with the effect that explains most beside a free geometry, and its noise: a
+        geometry fitted without it may be millimetres off, too far for a linear model."""
         engine = self.free_geometry()
         present, noise = engine.fit_with_noise(engine.initial_model)
         listed = [s for s in engine.scores(present, noise) if s.net_gain > 0][:_SHORT_LIST]
@@ -237,11 +228,8 @@ class Preparation:
 def prepare_selection(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue
 ) -> Preparation:
-    """Read poses, estimate their noise and collect the candidates.
-
-    Raises RunError with every fault of every run, and with the mistakes in its poses; FileError for
-    effects that do not bind.
-    """
+    """Read poses, estimate their noise and collect the candidates. Raises RunError with every fault
+    and mistake of the runs; FileError for effects that do not bind."""
     dataset = prepare_poses(runs, profile)
     if not dataset.moves:
         refuse_mistakes(robot_of(profile), dataset.measured)

@@ -111,10 +111,8 @@ def rest_poses(robot: Robot, wanted: Pose) -> Rest:
 
 
 def _step(robot: Robot, pose: Pose, force: Array, weight: float) -> tuple[Array, Array]:
-    """Wrench that is left over as a share of the weight, (p,), and the step of Newton's method.
-
-    The step is a rotation vector and forces in weights, (p, 3 + n); NaN where a cable has no way.
-    """
+    """Wrench that is left over as a share of the weight, (p,), and the step of Newton's method, a
+    rotation vector and forces in weights, (p, 3 + n); NaN where a cable has no way."""
     count = force.shape[1]
     left, step = np.full(len(force), np.inf), np.full((len(force), 3 + count), np.nan)
     good = np.isfinite(lengths(robot.geometry, pose.position, pose.rotation)).all(axis=1)

@@ -1,8 +1,5 @@
 """Forward kinematics: the platform's pose from cable lengths.
 
-    found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
-    found.pose.position[found.converged]
-
 With as many cables as degrees of freedom, or more, that hold all of these, the pose is the
 least-squares solution of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the
 platform hangs where its potential energy is least under the constraint of the lengths (sequential
@@ -304,12 +301,9 @@ def _lattice(free: tuple[float, ...]) -> Array:
 
 
 def _starts(geometry: Geometry, given: Array, start: Pose) -> Pose:
-    """Poses from which the search begins, (p, s, 3) and (p, s, 3, 3), the best first.
-
-    Each rotation of the lattice gets the position that meets the lengths best, by damped
-    Gauss-Newton steps with fixed exit points, from either side of the plane that is nearest to the
-    exit points: where they lie in it, lengths say nothing of the side.
-    """
+    """Poses from which the search begins, (p, s, 3) and (p, s, 3, 3), the best first. Each rotation
+    has the position that meets the lengths best, from either side of the plane nearest to the exit
+    points: where they lie in it, lengths say nothing of the side."""
     moved = geometry.free[:3] > 0
     lattice = _lattice(tuple(geometry.free[3:].tolist()))
     rotation = np.tile(lattice @ start.rotation[:, None], (1, 2, 1, 1))

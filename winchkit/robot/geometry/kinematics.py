@@ -134,10 +134,7 @@ def home_of(profile: RobotProfile) -> Pose:
 
 
 def guided(pose: Pose, home: Pose, free: Array) -> Pose:
-    """Poses with those coordinates of home that guides hold, and all others as they are.
-
-    ``pose``: the p poses. ``home``: one pose. ``free`` (6,): of :class:`Geometry`.
-    """
+    """Poses with those coordinates of ``home``, one pose, that guides hold."""
     if free.all():
         return pose
     turned = rotation_vector(pose.rotation @ home.rotation[0].T) * free[3:]
@@ -222,10 +219,8 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
 
 
 def straight_cables(geometry: Geometry, pose: Pose) -> tuple[Array, Array]:
-    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame.
-
-    ``geometry``: of n lines. ``pose``: the p poses. NaN where an anchor lies inside its pulley.
-    """
+    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame; NaN
+    where an anchor lies inside its pulley."""
     t = _tangent(geometry, pose.position, pose.rotation)
     away = -linearised(geometry, pose.position, pose.rotation)[1].exit_point
     end = np.stack(t.arm, axis=-1) + pose.position[:, None]

@@ -32,11 +32,8 @@ HOME_LENGTH = "home-length"
 
 
 def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
-    """Values of a profile's effects that a calibration fits.
-
-    Returns: by effect the parameters of a law of elongation, or home lengths by line, SI. Raises
-    FileError for a value that cannot be read.
-    """
+    """Values of a profile's effects that a calibration fits, SI: those of a law of elongation, and
+    home lengths by line. Raises FileError."""
     out: dict[str, dict[str, float]] = {}
     faults: list[Fault] = []
     for table in profile.effect:
@@ -303,13 +300,9 @@ def parameters_of(
     effects: Sequence[str] = (),
     instruments: InstrumentValues | None = None,
 ) -> Parameters:
-    """Parameters of geometry, winches, named effects and instruments.
-
-    ``measured``: readings, whose instruments have zeros where the robot's file does not know them.
-    ``effects``: beside those of the robot's profile. A law of elongation adds home lengths, since
-    the tension at home is unknown. ``instruments``: numbers that are unknown, with their starting
-    values. Raises UsageError for an effect that is no parameter, or two laws of elongation.
-    """
+    """Parameters of geometry, winches, named effects and unknown numbers of instruments. A law of
+    elongation adds home lengths, since the tension at home is unknown. Raises UsageError for an
+    effect that is no parameter, or two laws of elongation."""
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))
     _known(effects)

@@ -229,10 +229,8 @@ class _MistakeSearch:
         return sorted(better, key=lambda trial: trial.error)[: _ADJUSTED * count]
 
     def _by_lengths(self, angle: Array) -> tuple[Pose, Array]:
-        """Poses (h, p) of motor angles (h, p, n) by the lengths alone, and median residuals (h,).
-
-        A constant part of each line is that of its home length, which may be unknown.
-        """
+        """Poses (h, p) of motor angles (h, p, n) by the lengths alone, and median residuals (h,)
+        but for a constant of each line, whose home length may be unknown."""
         many, count, lines = angle.shape
         geometry, home = self.robot.geometry, self.robot.home
         given = self.robot.lengths_at(angle.reshape(-1, lines))
@@ -365,10 +363,8 @@ class _MistakeSearch:
 
 
 def _registration(seen: Array, point: Array, *, left_handed: bool) -> tuple[Array, float, float]:
-    """Rotation or rotary reflection (3, 3), scale and median distance, m, of Umeyama's closed form.
-
-    ``seen``, ``point`` (p, 3): m.
-    """
+    """Rotation or rotary reflection (3, 3), scale and median distance, m, by Umeyama's closed
+    form."""
     seen, point = seen - seen.mean(axis=0), point - point.mean(axis=0)
     left, size, right = np.linalg.svd(seen.T @ point)
     wanted = -1.0 if left_handed else 1.0

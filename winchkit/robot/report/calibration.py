@@ -37,10 +37,7 @@ def calibration_html(
     source: str = "",
     written: str = "",
 ) -> str:
-    """The page, self-contained.
-
-    ``written``: empty where none was.
-    """
+    """The page, self-contained; ``written`` is the profile, empty where none was."""
     chip, tone = _verdict(found)
     figures = calibration_figures(found, source)
     pair = [figure_block(figure, _SIDE) for figure in figures]
