@@ -19,7 +19,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 DEAD_WRAPS = 2.0
 """Least number of turns on a drum under load (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
 
-Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue (:func:`wrap_ratio`).
+Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue.
 """
 _TURN = 2 * pi
 _ROUNDING = 1e-9
@@ -36,10 +36,6 @@ class Capacity:
     """Cable on the drum at that many turns, m; NaN in the same case."""
     limited_by: Literal["width", "flange", ""]
     """Dimension of the drum that is reached first; empty where unknown."""
-
-    def remaining(self, turns: float) -> float:
-        """Turns that can still be wound in with ``turns`` on the drum; negative: overfilled."""
-        return self.turns - turns
 
 
 def capacity(profile: WinchProfile) -> Capacity:
@@ -113,15 +109,6 @@ def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
     """Free cable lengths between a full drum and the last two dead wraps, m; NaN where no
     dimension, or no reference, is declared."""
     return length_at(profile, capacity(profile).turns), length_at(profile, DEAD_WRAPS)
-
-
-def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
-    """Ratio of the cable's tension to the force on its clamp behind dead wraps.
-
-    ``friction``: coefficient μ between cable and drum. ``turns``: dead wraps n. Returns: e^(2π μ n)
-    (Euler-Eytelwein): 3.5 for two wraps at μ = 0.1.
-    """
-    return float(np.exp(_TURN * friction * turns))
 
 
 def drum_warnings(

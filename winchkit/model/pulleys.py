@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,7 @@ from numpy.typing import ArrayLike
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.friction import (
-    capstan_ratio,
-    dahl_step,
-    stribeck,
-    tension_after,
-)
+from winchkit.model.friction import capstan_ratio, stribeck, tension_after
 
 Step = Callable[[float, float, float, float, float], float]
 PulleyStep = Callable[..., Any]
@@ -99,36 +94,6 @@ def presliding_step(step: Step) -> PulleyStep:
         return new, normal
 
     return pulley_step
-
-
-@dataclass(frozen=True)
-class DahlPulleys:
-    """Pulleys whose friction builds up with distance before it slides (Dahl, Eq. 25)."""
-
-    friction: float
-    stiffness: float
-    """σ, N/m."""
-    shape: float = 1.0
-    """β."""
-
-    def over(self, tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike) -> Array:
-        """Tension (n,), N, behind all pulleys along cable positions ``towards`` (m), without
-        friction at the first sample."""
-        carried, position = np.broadcast_arrays(
-            np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
-        )
-        moved = np.diff(position, prepend=position[:1])
-        for wrap in wraps:
-            carried = carried + self._forces(carried, moved, cos(wrap))
-        return np.asarray(carried)
-
-    def _forces(self, tension: Array, moved: Array, cosine: float) -> Array:
-        step = presliding_step(dahl_step)
-        force, out = 0.0, []
-        for t, d in zip(tension.tolist(), moved.tolist(), strict=True):
-            force, _ = step(force, t, d, cosine, self.friction, self.stiffness, self.shape)
-            out.append(force)
-        return np.array(out)
 
 
 def eq27_tension(

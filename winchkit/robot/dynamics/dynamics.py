@@ -35,7 +35,6 @@ from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec
-from winchkit.units import GRAVITY
 
 _FEWEST = 4
 """A cubic spline with third derivatives continuous at the second and last but one pose (not-a-knot)
@@ -193,16 +192,6 @@ def inverse_dynamics(
         torque[:, i] = line.predict(line.motion(signals))["motor_torque"]
     angle[~known], torque[~known] = np.nan, np.nan
     return InverseDynamics(wrench, force, angle, torque)
-
-
-def sag(length: Array, span: Array, force: Array, mass_per_length: float) -> Array:
-    """Difference of a sagging cable's length and its chord, m.
-
-    ``length``: of the chord, m. ``span``: its horizontal projection, m. ``force``: along the chord,
-    N. ``mass_per_length``: kg/m. Returns: (μ g h)² l / (24 f²), the parabola. For a level cable the
-    next term of the catenary is (μ g l / f)² / 80 of it.
-    """
-    return np.asarray((mass_per_length * GRAVITY * span) ** 2 * length / (24 * force**2))
 
 
 def _inertia(platform: PlatformSpec, rotation: Array) -> Array:

@@ -75,7 +75,12 @@ class Robot:
     @property
     def winches(self) -> list[WinchProfile]:
         """Profiles of the lines' winches."""
-        return _winches(self.profile)
+        found = []
+        for line in self.profile.line:
+            if not isinstance(line.winch, WinchProfile):
+                raise UsageError(f"line {line.name}: winch '{line.winch}' has not been read")
+            found.append(line.winch)
+        return found
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
@@ -459,12 +464,3 @@ def _law(drum: Drum) -> tuple[float, float, float]:
 
 def _ratio(winch: WinchProfile) -> float:
     return winch.gearbox.direction * winch.gearbox.ratio
-
-
-def _winches(profile: RobotProfile) -> list[WinchProfile]:
-    found = []
-    for line in profile.line:
-        if not isinstance(line.winch, WinchProfile):
-            raise UsageError(f"line {line.name}: winch '{line.winch}' has not been read")
-        found.append(line.winch)
-    return found
