@@ -342,11 +342,9 @@ def _angles(
         profile,
         modifiers_of(t for t in terms if not t.effect.not_in_control and not t.effect.memory),
     )
-    zero = np.zeros_like(length)
     angle = line.nominal_motor_angle(length)
     for _ in range(_NEWTON_STEPS):
-        at = line.moments(zero, angle, zero, zero + weight, zero + _TEMPERATURE)
-        there, arm = line.lengths_and_arms(at)
+        there, arm = line.lengths_and_arms(line.at_rest(angle, weight, _TEMPERATURE))
         angle = angle + (there - length) / arm
     return angle, arm
 

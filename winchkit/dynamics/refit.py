@@ -58,27 +58,18 @@ standard deviation changes it by one."""
 
 @dataclass(frozen=True)
 class MotionFit:
-    """Values refitted to the simulated motion, and its errors.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        All effects, those between torque and motion with new values.
-    std : tuple of dict of str to float
-        Standard deviations of the new values, SI; empty of an effect that does not act on the
-        motion.
-    before, after : tuple of SimulatedError
-        Error of each run simulated as a whole from the measured torque: before from the measured
-        initial state, after from that of the fit.
-    converged : bool
-        Whether the fit ended before the limit of its steps.
-    """
+    """Values refitted to the simulated motion, and its errors."""
 
     terms: tuple[Term, ...]
+    """All effects, those between torque and motion with new values."""
     std: tuple[dict[str, float], ...]
+    """Of the new values, SI; empty of an effect that does not act on the motion."""
     before: tuple[SimulatedError, ...]
+    """Of each run simulated as a whole from the measured torque and initial state."""
     after: tuple[SimulatedError, ...]
+    """The same from the initial state of the fit."""
     converged: bool
+    """Whether the fit ended before the limit of its steps."""
 
     @property
     def unit(self) -> str:

@@ -285,12 +285,12 @@ class Line:
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
-        at = self._at_rest(motor_angle, tension)
+        at = self.at_rest(motor_angle, tension)
         return float(self.indicated_length(at, self.kinematics(at))[0])
 
     def arm(self, motor_angle: float) -> float:
         """Cable wound in per motor angle, signed by the gearbox's direction, m/rad."""
-        return float(self.kinematics(self._at_rest(motor_angle, 0.0)).arm[0])
+        return float(self.kinematics(self.at_rest(motor_angle)).arm[0])
 
     def nominal_motor_angle(self, cable_length: Array) -> Array:
         """Motor angles of the nominal line at cable lengths (m), any shape, rad."""
@@ -310,10 +310,16 @@ class Line:
             angle += excess / self.arm(angle)
         return angle
 
-    def _at_rest(self, motor_angle: float, tension: float) -> At:
-        """One sample at rest, at 20 degrees Celsius."""
-        angle, force, zero = np.array([motor_angle]), np.array([tension]), np.zeros(1)
-        return self.moments(zero, angle, zero, force, np.array([20.0]))
+    def at_rest(
+        self,
+        motor_angle: Array | float,
+        tension: Array | float = 0.0,
+        temperature: Array | float = 20.0,
+    ) -> At:
+        """Samples at rest, (n,), N and degrees Celsius."""
+        angle = np.atleast_1d(np.asarray(motor_angle, dtype=float))
+        zero = np.zeros_like(angle)
+        return self.moments(zero, angle, zero, zero + tension, zero + temperature)
 
     def lengths_and_arms(self, at: At) -> tuple[Array, Array]:
         """Cable lengths at rest, (n,), m, and cable wound in per motor angle there, m/rad."""
@@ -323,5 +329,5 @@ class Line:
     @property
     def drum(self) -> Drum:
         """The drum with its modifiers."""
-        drum: Drum = self._through(Stage.DRUM, self._drum, self._at_rest(0.0, 0.0))
+        drum: Drum = self._through(Stage.DRUM, self._drum, self.at_rest(0.0))
         return drum

@@ -44,7 +44,7 @@ from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.robot import COORDINATES, RobotProfile
 from winchkit.schema.read import read_robot
 
 if TYPE_CHECKING:
@@ -52,8 +52,7 @@ if TYPE_CHECKING:
 
 _TRIES = 40
 """Draws of one pose, of which one is to be within the limits."""
-_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-_CHANNELS = tuple(f"platform_{axis}" for axis in _AXES)
+_CHANNELS = tuple(f"platform_{axis}" for axis in COORDINATES)
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 _POLL = 0.05
 """s: 20 readings of all instruments in a dwell of 1 s."""
@@ -274,7 +273,7 @@ class _Driver:
         home = self.bench.robot.robot.home
         for _ in range(count):
             for _ in range(_TRIES):
-                change = dict(zip(_AXES, random.uniform(-reach, reach).tolist(), strict=True))
+                change = dict(zip(COORDINATES, random.uniform(-reach, reach).tolist(), strict=True))
                 if self._go(moved(home, change, relative=True)):
                     break
             else:

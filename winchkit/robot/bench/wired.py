@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from winchkit.robot.bench.platform import Platform
 from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.geometry.robot import Robot
@@ -49,8 +47,8 @@ class RobotOfBench:
         mass is at the anchor points; cables without a stiffness have one at which the middle of
         ``tension`` stretches them by half a per cent, as of fibre."""
         profile, wiring = self.robot.profile, self.wiring
-        size = float(np.mean(np.sum(self.robot.geometry.anchor_point**2, axis=1)))
-        inertia = profile.platform.inertia or (2 / 3 * size * self.mass,) * 3
+        there = 2 / 3 * self.robot.geometry.lever**2 * self.mass
+        inertia = profile.platform.inertia or (there,) * 3
         middle = sum(wiring.tension) / 2
         declared = [line.profile.cable.axial_stiffness for line in self.robot.lines]
         stiffness = min((one for one in declared if one is not None), default=middle / _STRETCH)

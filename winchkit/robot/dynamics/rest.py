@@ -174,11 +174,10 @@ def pendulum_modes(robot: Robot, pose: Pose, force: Array) -> tuple[Array, Array
 def _linear(robot: Robot, pose: Pose, force: Array) -> tuple[Array, Array]:
     """Derivatives of the lengths (p, n, 6), and of the balance (p, 6, 6), by the pose."""
     _, by = linearised(robot.geometry, pose.position, pose.rotation)
-    slope = np.concatenate([by.position, by.rotation], axis=-1)
     bend = weight_hessian(robot.platform, pose.rotation) + np.einsum(
         "pn,pnij->pij", force, length_hessian(robot.geometry, pose.position, pose.rotation)
     )
-    return slope, bend
+    return by.pose, bend
 
 
 def _reduced(
@@ -197,5 +196,5 @@ def _reduced(
 
 def _scale(robot: Robot) -> Array:
     """One for forces, and the reciprocal of the anchors' distance for moments, (6,)."""
-    lever = float(np.sqrt(np.mean(np.sum(robot.geometry.anchor_point**2, axis=1))))
+    lever = robot.geometry.lever
     return np.repeat([1.0, 1.0 / lever if lever > 0 else 1.0], 3)

@@ -75,8 +75,7 @@ def hanging_residual(
 
 def wrench_scale(geometry: Geometry) -> Array:
     """Diagonal of S, (6,)."""
-    lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
-    return np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
+    return np.repeat([1.0, 1.0 / max(geometry.lever, _STEP)], 3)
 
 
 def hanging_balance(

@@ -158,7 +158,7 @@ def closure(
         stressed = (length + dead_length)[..., None]
         by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
     residual = closure_residual(length, by_drum, taken, dead_length)
-    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
+    return Constraint(residual, by.pose * slack[..., None], by_line, by_robot)
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
@@ -198,7 +198,7 @@ def swivel(
     """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``."""
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
-    return Constraint(swivel_residual(geometry, pose, measured, zero), by_pose(by), by_line)
+    return Constraint(swivel_residual(geometry, pose, measured, zero), by.pose, by_line)
 
 
 def cable_length(
@@ -207,7 +207,7 @@ def cable_length(
     """Geometric lengths plus offsets of their instruments less readings, (p, n), m."""
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
-    return Constraint(length + offset - measured, by_pose(by), by_line)
+    return Constraint(length + offset - measured, by.pose, by_line)
 
 
 def mean_offset(residual: Array, *, angles: bool) -> Array:
@@ -218,11 +218,6 @@ def mean_offset(residual: Array, *, angles: bool) -> Array:
     if angles:
         return np.asarray(-np.angle(np.where(known, np.exp(1j * values), 0.0).sum(axis=0)))
     return np.asarray(-values.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
-
-
-def by_pose(by: Sensitivities) -> Array:
-    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
-    return np.concatenate([by.position, by.rotation], axis=-1)
 
 
 def wrapped(angle: Array) -> Array:

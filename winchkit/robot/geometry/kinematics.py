@@ -58,6 +58,11 @@ class Geometry:
         between = self.exit_point[:, None] - self.exit_point
         return float(np.max(np.linalg.norm(between, axis=2)))
 
+    @property
+    def lever(self) -> float:
+        """Rms distance of the anchor points from the platform's origin, m."""
+        return float(np.sqrt(np.mean(np.sum(self.anchor_point**2, axis=1))))
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -87,6 +92,11 @@ class Sensitivities:
     """By the line's own anchor point, (p, n, 3)."""
     swivel_radius: Array
     """By the line's own swivel radius, (p, n)."""
+
+    @property
+    def pose(self) -> Array:
+        """By position and rotation vector beside each other, (p, n, 6)."""
+        return np.concatenate([self.position, self.rotation], axis=-1)
 
 
 class _Tangent(NamedTuple):
@@ -294,8 +304,7 @@ def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Ar
         Forces first, then moments about the platform's origin, base axes; Aᵀ f + w = 0 at rest
         (IPAnema paper, Eq. 7). Rows of coordinates that guides hold are zero.
     """
-    by = sensitivities(geometry, position, rotation)
-    return -np.concatenate([by.position, by.rotation], axis=-1).transpose(0, 2, 1)
+    return -sensitivities(geometry, position, rotation).pose.transpose(0, 2, 1)
 
 
 def _unit(t: _Tangent) -> list[Array]:

@@ -50,7 +50,7 @@ from winchkit.robot.geometry.constraints import (
 )
 from winchkit.robot.geometry.kinematics import Pose, lengths
 from winchkit.robot.geometry.pose_estimation import moved_pose, start_pose
-from winchkit.robot.geometry.robot import Robot, standing
+from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import (
     Tracker,
     pose_behind,
@@ -204,7 +204,7 @@ class RobotEquations(ParametrizedRobot):
         angle, trajectory = self.measured.motor_angle[rows, index], self.trajectory
         temperature = self.temperature[rows, index]
         if trajectory is None:
-            return standing(line, angle, force, temperature)
+            return line.at_rest(angle, force, temperature)
         rate = trajectory.motor_rate[rows, index]
         return line.moments(trajectory.time[rows], angle, rate, force, temperature)
 

@@ -22,7 +22,6 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
 from winchkit.robot.files.poses import MeasuredPoses
-from winchkit.robot.geometry.constraints import by_pose
 from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
@@ -238,7 +237,7 @@ class _MistakeSearch:
 
         def whitened(pose: Pose) -> tuple[Array, Array]:
             length, by = linearised(geometry, pose.position, pose.rotation)
-            residual, slope = length - given, by_pose(by)
+            residual, slope = length - given, by.pose
             known = np.isfinite(residual) & np.all(np.isfinite(slope), axis=2)
             return np.where(known, residual, 0.0), np.where(known[..., None], slope, 0.0)
 

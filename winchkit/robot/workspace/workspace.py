@@ -331,13 +331,13 @@ def _of_wrenches(
     robot: Robot, pose: Pose, structure: Array, demand: CableDemand, limits: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     free = robot.geometry.free > 0
-    spread = float(np.sqrt(np.mean(np.sum(robot.geometry.anchor_point**2, axis=1))))
-    lever = np.repeat([1.0, spread or 1.0], 3)[free]
+    spread = robot.geometry.lever or 1.0
+    lever = np.repeat([1.0, spread], 3)[free]
     given = Wrenches(
         structure[:, free] / lever[:, None],
         robot.weight(pose)[:, free] / lever,
         *limits,
-        (demand.force, demand.moment / (spread or 1.0)),
+        (demand.force, demand.moment / spread),
         int(np.count_nonzero(free[:3])),
     )
     return margins(given)
