@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from winchkit.robot.bench.platform import Platform
 from winchkit.robot.bench.wiring import robot_of_bench
+from winchkit.robot.geometry.kinematics import lever_of
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.instruments import FrameSpec
@@ -47,7 +48,7 @@ class RobotOfBench:
         mass is at the anchor points; cables without a stiffness have one at which the middle of
         ``tension`` stretches them by half a per cent, as of fibre."""
         profile, wiring = self.robot.profile, self.wiring
-        there = 2 / 3 * self.robot.geometry.lever**2 * self.mass
+        there = 2 / 3 * lever_of(self.robot.geometry) ** 2 * self.mass
         inertia = profile.platform.inertia or (there,) * 3
         middle = sum(wiring.tension) / 2
         declared = [line.profile.cable.axial_stiffness for line in self.robot.lines]

@@ -29,7 +29,7 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.dynamics.dynamics import mass_matrix
 from winchkit.robot.geometry.hessian import length_hessian
-from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, lever_of, linearised
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_hessian
 from winchkit.units import GRAVITY
@@ -177,7 +177,7 @@ def _linear(robot: Robot, pose: Pose, force: Array) -> tuple[Array, Array]:
     bend = weight_hessian(robot.platform, pose.rotation) + np.einsum(
         "pn,pnij->pij", force, length_hessian(robot.geometry, pose.position, pose.rotation)
     )
-    return by.pose, bend
+    return by_pose(by), bend
 
 
 def _reduced(
@@ -196,5 +196,5 @@ def _reduced(
 
 def _scale(robot: Robot) -> Array:
     """One for forces, and the reciprocal of the anchors' distance for moments, (6,)."""
-    lever = robot.geometry.lever
+    lever = lever_of(robot.geometry)
     return np.repeat([1.0, 1.0 / lever if lever > 0 else 1.0], 3)

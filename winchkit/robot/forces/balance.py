@@ -27,7 +27,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.robot.geometry.constraints import Constraint
-from winchkit.robot.geometry.kinematics import Geometry, Pose, structure_matrix
+from winchkit.robot.geometry.kinematics import Geometry, Pose, lever_of, structure_matrix
 from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
@@ -75,7 +75,7 @@ def hanging_residual(
 
 def wrench_scale(geometry: Geometry) -> Array:
     """Diagonal of S, (6,)."""
-    return np.repeat([1.0, 1.0 / max(geometry.lever, _STEP)], 3)
+    return np.repeat([1.0, 1.0 / max(lever_of(geometry), _STEP)], 3)
 
 
 def hanging_balance(

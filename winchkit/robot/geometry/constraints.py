@@ -35,6 +35,7 @@ from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
     Sensitivities,
+    by_pose,
     linearised,
     sensitivities,
     swivel_angle,
@@ -158,7 +159,7 @@ def closure(
         stressed = (length + dead_length)[..., None]
         by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
     residual = closure_residual(length, by_drum, taken, dead_length)
-    return Constraint(residual, by.pose * slack[..., None], by_line, by_robot)
+    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
@@ -198,7 +199,7 @@ def swivel(
     """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``."""
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
-    return Constraint(swivel_residual(geometry, pose, measured, zero), by.pose, by_line)
+    return Constraint(swivel_residual(geometry, pose, measured, zero), by_pose(by), by_line)
 
 
 def cable_length(
@@ -207,7 +208,7 @@ def cable_length(
     """Geometric lengths plus offsets of their instruments less readings, (p, n), m."""
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
-    return Constraint(length + offset - measured, by.pose, by_line)
+    return Constraint(length + offset - measured, by_pose(by), by_line)
 
 
 def mean_offset(residual: Array, *, angles: bool) -> Array:

@@ -24,7 +24,14 @@ from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.geometry.hessian import length_hessian
-from winchkit.robot.geometry.kinematics import Geometry, Pose, lengths, linearised, sensitivities
+from winchkit.robot.geometry.kinematics import (
+    Geometry,
+    Pose,
+    by_pose,
+    lengths,
+    linearised,
+    sensitivities,
+)
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_hessian
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
@@ -417,7 +424,7 @@ class _PoseSearch:
     ) -> tuple[Array, Array]:
         """Next step of position and rotation vector, (p, 6), and the cable forces, (p, n)."""
         length, by = linearised(self.geometry, at.position, at.rotation)
-        slope, missing = by.pose, given - length
+        slope, missing = by_pose(by), given - length
         good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
         step, forces = np.full((len(given), 6), np.nan), np.full_like(given, np.nan)
         there = at[good]
@@ -495,7 +502,7 @@ def _balanced(matrix: Array) -> tuple[Array, Array]:
 
 def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
     """Whether the cables hold all degrees of freedom, (p,)."""
-    slope = sensitivities(geometry, at.position, at.rotation).pose
+    slope = by_pose(sensitivities(geometry, at.position, at.rotation))
     normal = np.swapaxes(slope, 1, 2) @ slope + np.diag(1 - geometry.free)
     stiff = np.linalg.eigvalsh(_balanced(normal)[0])
     return np.asarray(stiff[:, 0] > _LOOSE)

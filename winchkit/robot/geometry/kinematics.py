@@ -58,11 +58,6 @@ class Geometry:
         between = self.exit_point[:, None] - self.exit_point
         return float(np.max(np.linalg.norm(between, axis=2)))
 
-    @property
-    def lever(self) -> float:
-        """Rms distance of the anchor points from the platform's origin, m."""
-        return float(np.sqrt(np.mean(np.sum(self.anchor_point**2, axis=1))))
-
 
 @dataclass(frozen=True)
 class Pose:
@@ -93,10 +88,15 @@ class Sensitivities:
     swivel_radius: Array
     """By the line's own swivel radius, (p, n)."""
 
-    @property
-    def pose(self) -> Array:
-        """By position and rotation vector beside each other, (p, n, 6)."""
-        return np.concatenate([self.position, self.rotation], axis=-1)
+
+def lever_of(geometry: Geometry) -> float:
+    """Rms distance of the anchor points from the platform's origin, m."""
+    return float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
+
+
+def by_pose(by: Sensitivities) -> Array:
+    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
+    return np.concatenate([by.position, by.rotation], axis=-1)
 
 
 class _Tangent(NamedTuple):
@@ -304,7 +304,7 @@ def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Ar
         Forces first, then moments about the platform's origin, base axes; Aᵀ f + w = 0 at rest
         (IPAnema paper, Eq. 7). Rows of coordinates that guides hold are zero.
     """
-    return -sensitivities(geometry, position, rotation).pose.transpose(0, 2, 1)
+    return -by_pose(sensitivities(geometry, position, rotation)).transpose(0, 2, 1)
 
 
 def _unit(t: _Tangent) -> list[Array]:

@@ -22,7 +22,7 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
 from winchkit.robot.files.poses import MeasuredPoses
-from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, registered
@@ -205,7 +205,7 @@ class _MistakeSearch:
 
     def _compared(self, count: int) -> list[_Trial]:
         """Trials of ``count`` mistakes at most that agree better than the table, the best ones."""
-        motors = motor_mistakes(self.robot)
+        motors = list(motor_mistakes(self.robot))
         chosen: list[tuple[Mistake, ...]] = [(), *((mistake,) for mistake in motors)]
         if count > 1:
             chosen += permutations(motors, 2)
@@ -237,7 +237,7 @@ class _MistakeSearch:
 
         def whitened(pose: Pose) -> tuple[Array, Array]:
             length, by = linearised(geometry, pose.position, pose.rotation)
-            residual, slope = length - given, by.pose
+            residual, slope = length - given, by_pose(by)
             known = np.isfinite(residual) & np.all(np.isfinite(slope), axis=2)
             return np.where(known, residual, 0.0), np.where(known[..., None], slope, 0.0)
 
@@ -341,7 +341,7 @@ class _MistakeSearch:
             own = [*frames, *free]
             return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
 
-        plain, every = compared(()), rotation_mistakes()
+        plain, every = compared(()), list(rotation_mistakes())
         if plain.error <= _ANGLE_NOISE:
             return
         best_set = [plain]

@@ -33,7 +33,7 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import ForceLimits
-from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.kinematics import Pose, lever_of
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.workspace.circuits import Wrenches, margins
 from winchkit.robot.workspace.distances import distances
@@ -331,7 +331,7 @@ def _of_wrenches(
     robot: Robot, pose: Pose, structure: Array, demand: CableDemand, limits: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     free = robot.geometry.free > 0
-    spread = robot.geometry.lever or 1.0
+    spread = lever_of(robot.geometry) or 1.0
     lever = np.repeat([1.0, spread], 3)[free]
     given = Wrenches(
         structure[:, free] / lever[:, None],
