@@ -9,7 +9,7 @@ zero, which estimates over time and over winches require.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import cos, log, sin
@@ -142,15 +142,14 @@ class _Linear:
     """Derivative of the value by the coordinate."""
 
 
-def _linear(term: Term, vector: Array) -> list[_Linear]:
-    coordinates, out = Coordinates(term.effect), []
+def _linear(term: Term, vector: Array) -> Iterator[_Linear]:
+    coordinates = Coordinates(term.effect)
     for index, name in enumerate(coordinates.names):
         label, unit, of = _transform(term.effect, term.effect.parameter(name))
         moved = vector.copy()
         moved[index] += _STEP
         value, beside = (of(coordinates.values(x, term.values)) for x in (vector, moved))
-        out.append(_Linear(term.label, label, unit, value, (beside - value) / _STEP))
-    return out
+        yield _Linear(term.label, label, unit, value, (beside - value) / _STEP)
 
 
 def _transform(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Place, Step
 from winchkit.fleet.diagnosis.anova import SharedAttribution, SharedError
@@ -120,9 +120,8 @@ def _beside_noise(error: OutputError, scale: PrintScale) -> str:
     return f"{scale.text(error.rms)} ({significant(error.noise_rms / scale.worth, 2)})"
 
 
-def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
+def error_texts(shared: Mapping[str, SharedError]) -> Iterator[str]:
     """Per output the attribution of its errors: ``motor torque (…): direction 87 %, …``."""
-    out = []
     for output, error in shared.items():
         text = "; ".join(_followed(one) for one in error.follows[:_FOLLOWED])
         most = [
@@ -130,8 +129,7 @@ def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
         ]
         off = f"{quantity(error.rms, error.unit)} rms{''.join(most)}"
         name = OUTPUT_NAMES.get(output, output)
-        out.append(f"{name} ({off}): {text or 'no measured variable'}")
-    return out
+        yield f"{name} ({off}): {text or 'no measured variable'}"
 
 
 def _followed(one: SharedAttribution) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -111,11 +113,10 @@ def _misfit(
     return np.asarray(np.sqrt(square / np.maximum(linear.stack.known.sum(axis=1), 1)))
 
 
-def unexplained(equations: RobotEquations, solution: Solution) -> list[str]:
+def unexplained(equations: RobotEquations, solution: Solution) -> Iterator[str]:
     """One sentence per kind of instrument at the lines that does not show the predicted motion:
     less than half of its variance is explained, though at least half is predicted. An instrument
     that hardly moves says nothing."""
-    out = []
     readings = {
         "swivel": equations.measured.swivel,
         "cable_length": equations.measured.cable_length,
@@ -130,12 +131,11 @@ def unexplained(equations: RobotEquations, solution: Solution) -> list[str]:
             count = np.count_nonzero(np.isfinite(residual))
             unit, factor = ("deg", 180 / np.pi) if kind == "swivel" else ("mm", 1e3)
             noise, varies = (factor * np.sqrt(total / count) for total in (left, given))
-            out.append(
+            yield (
                 f"the {_WORDS[kind]} do not follow the geometry: they vary by {varies:.3g} {unit} "
                 f"and differ from it by {noise:.3g} {unit} rms beside their zeros; check "
                 f"{_CAUSES[kind]}"
             )
-    return out
 
 
 def _about_mean(values: Array) -> float:

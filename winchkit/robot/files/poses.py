@@ -370,17 +370,15 @@ def _partly(run: Run, profile: RobotProfile) -> list[str]:
     ]
 
 
-def _gaps(found: MeasuredPoses, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
-    notes = []
+def _gaps(found: MeasuredPoses, moved: NDArray[np.bool_], profile: RobotProfile) -> Iterator[str]:
     if left := int(np.count_nonzero(~moved)):
-        notes.append(f"{left} rows without any motor angle were left out")
+        yield f"{left} rows without any motor angle were left out"
     kept = found[moved]
     position = kept.position[:, ~held_unmeasured(kept, profile)]
     for name, values in (("motor_angle", kept.motor_angle), ("position", position)):
         missing = int(np.count_nonzero(np.isnan(values)))
         if 0 < missing < values.size:
-            notes.append(f"{missing} of {values.size} values of {name} are missing")
-    return notes
+            yield f"{missing} of {values.size} values of {name} are missing"
 
 
 def _temperature(run: Run, names: Sequence[str]) -> Array:

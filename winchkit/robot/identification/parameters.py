@@ -324,7 +324,7 @@ def parameters_of(
     if law or "home-length" in effects:
         build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
     if law:
-        build.add("law", _of_law(law, own.get(law, {})))
+        build.add("law", [*_of_law(law, own.get(law, {}))])
     _payload(build, effects)
     unknown = isinstance(robot.profile.instrument.swivels.zero, str)
     if unknown and np.any(np.isfinite(measured.swivel)):
@@ -342,15 +342,13 @@ def parameters_of(
     return found
 
 
-def _of_law(law: str, own: Mapping[str, float]) -> list[IdentifiedParameter]:
+def _of_law(law: str, own: Mapping[str, float]) -> Iterator[IdentifiedParameter]:
     """Parameters of a law that start at the values of the robot's file."""
-    out = []
     for spec in LAWS[law]:
         start = own.get(spec.name, np.nan)
         start = 1 / start if spec.reciprocal else start
         at = start if spec.name in own else spec.nominal
-        out.append(replace(spec, name=f"{law}.{spec.name}", nominal=at))
-    return out
+        yield replace(spec, name=f"{law}.{spec.name}", nominal=at)
 
 
 def _known(effects: Sequence[str]) -> None:
