@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from math import exp, pi
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,6 @@ from winchkit.model.capacity import (
     length_at,
     safe_lengths,
     turns_at,
-    wrap_ratio,
 )
 from winchkit.schema.profiles.winch import (
     CableSpec,
@@ -58,7 +57,6 @@ def test_a_groove_holds_its_width_over_its_pitch() -> None:
     assert (found.turns, found.limited_by) == (pytest.approx(60.0), "width")
     # One turn of the helix is the hypotenuse of circumference and pitch.
     assert found.length == pytest.approx(60 * np.hypot(2 * pi * 0.05, 0.005))
-    assert found.remaining(55.0) == pytest.approx(5.0)
 
 
 def test_a_spiral_drum_counts_its_layers() -> None:
@@ -85,7 +83,7 @@ def test_the_squared_law_fills_its_ring() -> None:
 
 def test_without_width_or_flange_nothing_is_known() -> None:
     bare = capacity(winch(DrumSpec("grooved", 0.05, groove_pitch=0.005)))
-    assert np.isnan([bare.turns, bare.length, bare.remaining(3.0)]).all()
+    assert np.isnan([bare.turns, bare.length]).all()
     assert bare.limited_by == ""
 
 
@@ -108,15 +106,6 @@ def test_safe_lengths_are_the_ends_of_the_stroke() -> None:
     assert shortest == pytest.approx(8.0 - 56 * per_turn)
     assert np.isnan(safe_lengths(replace(GROOVED, reference=ReferenceSpec()))).all()
     assert np.isnan(turns_at(replace(GROOVED, reference=ReferenceSpec()), 3.0))
-
-
-def test_dead_wraps_hold_by_friction() -> None:
-    """Euler-Eytelwein, integrated: dT = μ T dα over two turns."""
-    tension = 1.0
-    for _ in range(100_000):
-        tension *= 1 + 0.1 * 4 * pi / 100_000
-    assert wrap_ratio(0.1) == pytest.approx(tension, rel=1e-4)
-    assert wrap_ratio(0.1, 3.0) == pytest.approx(exp(0.6 * pi))
 
 
 def test_both_ends_are_warned_of() -> None:

@@ -8,17 +8,29 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from winchkit.arrays import Array
 from winchkit.errors import UsageError
+from winchkit.estimation import DahlEstimator, PulleyGroup
 from winchkit.model.friction import normal_force, stribeck, tension_after
-from winchkit.model.pulleys import Bearings, DahlPulleys, Eyelets, eq27_tension, over_pulleys
+from winchkit.model.pulleys import Bearings, Eyelets, eq27_tension, over_pulleys
 from winchkit.sim.physics.presliding import relax
 
 WRAPS = (pi / 2, pi, pi / 3)
 tensions = st.floats(1.0, 1e4)
 wraps = st.floats(0.05, pi)
 frictions = st.floats(-0.5, 0.5)
+
+
+def presliding(
+    tension: ArrayLike, wraps: tuple[float, ...], towards: Array, group: tuple[float, ...]
+) -> Array:
+    """Tension behind pulleys along a path, by the estimator's exact steps from zero friction."""
+    estimator = DahlEstimator([PulleyGroup(wraps, *group)])
+    samples = np.broadcast(tension, towards)
+    return np.array([estimator.update(float(pull), -float(way)).value for pull, way in samples])
 
 
 @given(tensions, wraps, frictions, st.floats(-0.3, 0.3))
@@ -75,7 +87,7 @@ def test_the_stribeck_curve_between_its_ends() -> None:
 @pytest.mark.parametrize("direction", [1, -1])
 def test_after_presliding_a_pulley_slides(direction: int) -> None:
     towards = direction * np.linspace(0, 0.5, 400)
-    found = DahlPulleys(0.03, 2000.0).over(300.0, WRAPS, towards)
+    found = presliding(300.0, WRAPS, towards, (0.03, 2000.0))
     slid = over_pulleys(300.0, WRAPS, float(direction), Bearings(0.03))
     assert found[0] == 300.0
     assert found[-1] == pytest.approx(float(slid), rel=1e-9)
@@ -88,15 +100,15 @@ def test_presliding_from_the_cell_undoes_presliding_from_the_platform(shape: flo
     time = np.linspace(0, 12, 6001)
     wound_in = 0.02 * np.sin(time) + 0.004 * np.sin(5 * time)
     platform = 300 + 30 * np.cos(0.7 * time)
-    law = DahlPulleys(0.02, 1500.0, shape)
-    cell = law.over(platform, WRAPS[::-1], wound_in)
+    group = (0.02, 1500.0, shape)
+    cell = presliding(platform, WRAPS[::-1], wound_in, group)
     assert np.ptp(cell - platform) > 20
-    assert np.allclose(law.over(cell, WRAPS, -wound_in), platform, atol=0.02)
+    assert np.allclose(presliding(cell, WRAPS, -wound_in, group), platform, atol=0.02)
 
 
 def test_presliding_is_the_simulators_integration() -> None:
     wound_in = 0.02 * np.sin(np.linspace(0, 12, 3000))
-    found = DahlPulleys(0.04, 1500.0).over(300.0, (2.0,), wound_in)
+    found = presliding(300.0, (2.0,), wound_in, (0.04, 1500.0))
     force, expected = 0.0, []
     for moved in np.diff(wound_in, prepend=wound_in[0]):
         normal = sqrt(300**2 - 2 * 300 * (300 + force) * cos(2.0) + (300 + force) ** 2)
@@ -173,13 +185,13 @@ def test_eq_27_and_the_exact_step_agree_from_a_fresh_start() -> None:
     """Eq. 26 and 27 hold from zero friction in one direction; losses small, one pulley."""
     friction, stiffness = 0.01, 2000.0
     towards = np.linspace(0, 0.03, 50)
-    platform = DahlPulleys(friction, stiffness).over(400.0, (pi / 2,), towards)
+    platform = presliding(400.0, (pi / 2,), towards, (friction, stiffness))
     loss = friction * 2 * sin(pi / 4)
     found = eq27_tension(platform, towards, (loss,), stiffness)
     assert np.allclose(found, 400.0, atol=0.05)
     # After a reversal the printed form no longer holds.
     back = np.concatenate([towards, towards[::-1]])
-    there = DahlPulleys(friction, stiffness).over(400.0, (pi / 2,), back)
+    there = presliding(400.0, (pi / 2,), back, (friction, stiffness))
     printed = eq27_tension(there, back, (loss,), stiffness)
     assert np.max(np.abs(printed - 400.0)) > 5
 

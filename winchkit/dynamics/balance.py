@@ -59,12 +59,9 @@ class EffectState:
 
 @dataclass(frozen=True)
 class Balance:
-    """Expressions of the motion under a motor torque.
-
-    Their symbols: ``time``, ``angle``, ``speed``, ``direction`` of the motor, −1 to 1, ``torque``
-    of the motor as its drive reports it, those of the signal ``load`` where it is an input, and
-    those of ``states``.
-    """
+    """Expressions of the motion under a motor torque, of the symbols ``time``, ``angle``,
+    ``speed``, ``direction`` of the motor, −1 to 1, its ``torque`` as its drive reports it, and
+    those of the signal ``load`` and of ``states``."""
 
     acceleration: Expression
     """Of the motor, rad/s²."""
@@ -120,12 +117,9 @@ def balance(
     *,
     is_load_known: bool = False,
 ) -> Balance:
-    """The balance of a profile with its effects.
-
-    ``load_mass``: kg. ``is_load_known``: whether the load is an input. Without both, and on an
-    axis, there is none. Raises UsageError with the
-    names of effects that no step is known of, and for a profile without inertia.
-    """
+    """The balance of a profile with its effects, under a mass, kg, a known load, or none. Raises
+    UsageError with the names of effects that no step is known of, and for a profile without
+    inertia."""
     acting = [t for t in terms if t.effect.stage in ON_MOTION and t.effect.undo is None]
     _refuse(profile, acting)
     tracer = _Tracer()

@@ -53,10 +53,8 @@ class SimulatedError:
 def simulated_errors(
     runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None = None
 ) -> list[SimulatedError]:
-    """Errors of the motions that the measured torque, and a recorded reference, would make.
-
-    Raises RunError and UsageError as :func:`winchkit.forward`.
-    """
+    """Errors of the motions that the measured torque, and a recorded reference, would make; raises
+    RunError and UsageError as :func:`winchkit.forward`."""
     return [error for run in runs for error in _of_run(run, profile, catalogue)]
 
 
@@ -75,11 +73,8 @@ def smoothed_rate(run: Run, profile: WinchProfile) -> tuple[Array, float]:
 def open_loop_error(
     profile: WinchProfile, terms: Sequence[Term], run: Run, setup: Setup, rate_noise: float
 ) -> SimulatedError:
-    """Error of the motion that the measured torque makes.
-
-    ``run``: with the channels of the model. ``rate_noise``: standard deviation of the initial
-    speed, rad/s.
-    """
+    """Error of the motion that the measured torque of a run in the model's channels makes;
+    ``rate_noise`` is the standard deviation of the initial speed, rad/s."""
     found = _error(profile, terms, run, setup, "torque")
     faster = replace(setup, speed=setup.speed + rate_noise)
     grown = np.abs(motion_of(profile, terms, faster).angle - found.simulated)

@@ -58,11 +58,9 @@ RECORDED = Drive(signal("torque"))
 
 
 def cascade(control: ControlSpec, holding: float) -> Drive:
-    """A position loop with feed forward of the speed around a velocity loop.
-
-    τ = k_v e + i, i' = k_v e/T with e = v_ref + k_p (q_ref − q) − v, within the torque limit; i
-    stays where the limit is reached and e leads beyond it. ``holding``: i at the start, N m.
-    """
+    """A position loop with feed forward of the speed around a velocity loop: τ = k_v e + i, i' =
+    k_v e/T with e = v_ref + k_p (q_ref − q) − v, within the torque limit, where i stays if e leads
+    beyond it. ``holding``: i at the start, N m."""
     behind = signal("goal") - symbol("angle")
     error = signal("goal_speed") + number(control.position_gain) * behind - symbol("speed")
     proportional = number(control.velocity_gain) * error

@@ -316,12 +316,8 @@ def statements(
     text: Callable[[Operation], str],
     literal: Callable[[float], str],
 ) -> tuple[list[tuple[str, str]], list[str]]:
-    """Assignments of a program that evaluates expressions, equal ones once.
-
-    ``names``: of the symbols in the program. ``text``: format of an operation. ``literal``: a
-    number in the program. Returns: names with their right sides in order, and the text of every
-    root.
-    """
+    """Assignments of a program that evaluates expressions, equal ones once, and the text of every
+    root; ``names`` are those of the symbols in the program."""
     lines: list[tuple[str, str]] = []
     seen: dict[str, str] = {}
     of: dict[int, str] = {}

@@ -194,10 +194,8 @@ def setup_of(
     *,
     is_torque: bool,
 ) -> Setup:
-    """The setup of a run whose torque drives the motor, or whose motion the loops follow.
-
-    Raises RunError as :func:`forward`.
-    """
+    """The setup of a run whose torque drives the motor, or whose motion the loops follow; raises
+    RunError as :func:`forward`."""
     require_type(run, Run, "torque" if is_torque else "reference")
     run = driving_part(run, profile, is_torque=is_torque)
     time = run.time
@@ -233,11 +231,9 @@ def setup_of(
 
 
 def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
-    """The part of a run with what drives a simulation, in the channels of the model.
-
-    From the first to the last sample at which all of it is known; short gaps between are straight
-    lines. Raises RunError for fewer than two samples and for a longer gap.
-    """
+    """The part of a run with what drives a simulation, in the channels of the model, from the first
+    to the last sample at which all is known; short gaps are straight lines. Raises RunError for
+    fewer than two samples and for a longer gap."""
     (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     used = {_driving(run, is_torque=is_torque), "motor_angle", "motor_velocity"}
     if not isinstance(profile, AxisProfile) and run.load_mass is None:
@@ -346,11 +342,9 @@ def _angles(
         profile,
         modifiers_of(t for t in terms if not t.effect.not_in_control and not t.effect.memory),
     )
-    zero = np.zeros_like(length)
     angle = line.nominal_motor_angle(length)
     for _ in range(_NEWTON_STEPS):
-        at = line.moments(zero, angle, zero, zero + weight, zero + _TEMPERATURE)
-        there, arm = line.lengths_and_arms(at)
+        there, arm = line.lengths_and_arms(line.at_rest(angle, weight, _TEMPERATURE))
         angle = angle + (there - length) / arm
     return angle, arm
 

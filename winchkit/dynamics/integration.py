@@ -55,10 +55,8 @@ Numbers = tuple[float, ...]
 
 
 def runge_kutta(rates: Mapping[str, Expression], tolerance: float) -> list[Expression]:
-    """A step of length ``step``: the new states, and its error in tolerances.
-
-    ``rates``: derivatives of the states by their names.
-    """
+    """A step of length ``step``: the new states, of which ``rates`` are the derivatives, and its
+    error in tolerances."""
     step, names, slopes = symbol("step"), list(rates), list(rates.values())
     k, moved = [slopes], dict[str, Expression]()
     for weights, share in zip(_STAGES, _TIMES, strict=True):
@@ -164,10 +162,8 @@ class Integrator:
         return compiled(substituted(roots, torque), self._arguments)
 
     def run(self, time: Array, angle: float, speed: float) -> SimulatedMotion:
-        """Integrate from an angle and a speed at the first of the times (n,), s.
-
-        Raises UsageError where the cable becomes slack or the motion cannot be integrated.
-        """
+        """Integrate from an angle and a speed at the first of the times (n,), s; raises UsageError
+        where the cable becomes slack or the motion cannot be integrated."""
         y: Numbers = (
             angle, speed, *(s.start for s in self.balance.states), *self.drive.states.values()
         )  # fmt: skip

@@ -69,11 +69,8 @@ class MujocoJoint:
 def joint_of(
     profile: WinchProfile, terms: Sequence[Term], elsewhere: Collection[str] = ()
 ) -> MujocoJoint:
-    """The joint of a profile with its effects.
-
-    ``elsewhere``: effects with a counterpart beside the joint. Raises UsageError for a profile
-    without masses.
-    """
+    """The joint of a profile with its effects, but for those ``elsewhere``; raises UsageError for a
+    profile without masses."""
     found: dict[str, float] = {}
     missing: list[str] = []
     comments: list[str] = []
@@ -108,11 +105,8 @@ def joint_of(
 def mjcf(
     profile: WinchProfile, terms: Sequence[Term], load_mass: float | None = None
 ) -> tuple[str, list[str]]:
-    """The model, and what it lacks of the profile.
-
-    ``load_mass``: on the cable of a winch, kg. Raises UsageError for a profile without masses, and
-    for a winch without a load.
-    """
+    """The model, and what it lacks of the profile; raises UsageError for a profile without masses,
+    and for a winch without a load (kg)."""
     joint = joint_of(profile, terms)
     missing = joint.missing
     is_axis = isinstance(profile, AxisProfile)
@@ -161,11 +155,9 @@ def _std(fitted: object) -> object:
 
 
 def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]:
-    """The body of a joint whose weight has the torque ``gravity`` sin(φ + phase), N m.
-
-    Any mass m at a distance l with m g l of this torque is the same; half of the inertia is taken
-    from the armature for it. Returns: the body's inertial element, and the armature.
-    """
+    """Inertial element, and left armature, of a joint whose weight has the torque ``gravity`` sin(φ
+    + phase), N m. Any mass m at a distance l with m g l of this torque is the same; half of the
+    inertia is taken for it."""
     small = f'diaginertia="{SMALL} {SMALL} {SMALL}"'
     if gravity == 0.0:
         return f'<inertial pos="0 0 0" mass="{SMALL}" {small}/>', inertia

@@ -58,27 +58,18 @@ standard deviation changes it by one."""
 
 @dataclass(frozen=True)
 class MotionFit:
-    """Values refitted to the simulated motion, and its errors.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        All effects, those between torque and motion with new values.
-    std : tuple of dict of str to float
-        Standard deviations of the new values, SI; empty of an effect that does not act on the
-        motion.
-    before, after : tuple of SimulatedError
-        Error of each run simulated as a whole from the measured torque: before from the measured
-        initial state, after from that of the fit.
-    converged : bool
-        Whether the fit ended before the limit of its steps.
-    """
+    """Values refitted to the simulated motion, and its errors."""
 
     terms: tuple[Term, ...]
+    """All effects, those between torque and motion with new values."""
     std: tuple[dict[str, float], ...]
+    """Of the new values, SI; empty of an effect that does not act on the motion."""
     before: tuple[SimulatedError, ...]
+    """Of each run simulated as a whole from the measured torque and initial state."""
     after: tuple[SimulatedError, ...]
+    """The same from the initial state of the fit."""
     converged: bool
+    """Whether the fit ended before the limit of its steps."""
 
     @property
     def unit(self) -> str:
@@ -113,31 +104,13 @@ def refit_to_motion(
     terms: Sequence[Term],
     progress: Callable[[int], None] = lambda step: None,
 ) -> MotionFit:
-    """Refit effects so that the measured torque makes the measured motion.
+    """Refit effects, from the values of ``terms``, so that the measured torque makes the measured
+    motion; ``progress`` is called with the number of the step.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs with motor angle and torque.
-    profile : WinchProfile
-        The winch or the axis.
-    terms : sequence of Term
-        All its effects, at the values from which the fit starts.
-    progress : callable
-        Called with the number of the fit's step.
-
-    Raises
-    ------
-    RunError
-        For a run without angle or torque, or with missing values.
-    UsageError
-        For effects without a step, and a motion that cannot be simulated, as :func:`forward`; where
-        no effect acts on the motion.
-
-    Notes
-    -----
-    Least squares of the position over all pieces. The standard deviations allow for errors that
-    are correlated within a piece (cluster-robust covariance).
+    Least squares of the position over all pieces. The standard deviations allow for errors that are
+    correlated within a piece (cluster-robust covariance). Raises RunError for a run without angle
+    or torque, or with missing values; UsageError for effects without a step, where none acts on the
+    motion, and as :func:`forward`.
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")

@@ -121,11 +121,8 @@ class _Recorder:
 
 
 def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch") -> LineSample:
-    """Trace one sample.
-
-    ``prefix``: of the names in the template. Raises UsageError with the effects that have no step,
-    and with a template to fill in.
-    """
+    """Trace one sample. Raises UsageError with the effects that have no step, and with a template
+    to fill in, its names with ``prefix``."""
     refused = [term for term in terms if _is_untraced(profile, term)]
     if refused:
         names = ", ".join(term.effect.id for term in refused)

@@ -1,7 +1,6 @@
 """Online estimators for control: tension and elongation that no instrument measures.
 
-``dahl`` removes the friction of pulleys from a cell's reading, ``cable_state`` serves the control
-loop. The public names are :class:`winchkit.DahlEstimator` and :func:`winchkit.identify_dahl`.
+The public names are :class:`winchkit.DahlEstimator` and :func:`winchkit.identify_dahl`.
 """
 
 from winchkit.estimation.dahl import DahlEstimator, PlatformTension

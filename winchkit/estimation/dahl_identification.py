@@ -30,15 +30,8 @@ identified: a condition of 1e10 leaves six of the sixteen digits (rule of thumb)
 
 
 def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> Array:
-    """Covariance of least-squares estimates under correlated residuals.
-
-    ``residuals`` (n,). ``jacobian`` (n, p). Returns (p, p): NaN for parameters without influence,
-    and for those that are not identifiable.
-
-    Notes
-    -----
-    s² τ (JᵀJ)⁻¹ with the residual variance s² and the integrated correlation time τ in samples.
-    """
+    """Covariance s² τ (JᵀJ)⁻¹ of least-squares estimates under correlated residuals, with the
+    correlation time τ in samples; NaN for parameters that are not identifiable."""
     rows, columns = jacobian.shape
     scale = np.sqrt(np.sum(jacobian**2, axis=0))
     used = scale > 0
@@ -56,14 +49,8 @@ def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> 
 
 
 def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
-    """Integrated correlation time in samples, at least 1.
-
-    ``residuals`` (n,).
-
-    Notes
-    -----
-    1 + 2 Σ ρ_k up to the first lag with ρ_k <= 0, from the autocovariances of all runs.
-    """
+    """Integrated correlation time in samples, at least 1: 1 + 2 Σ ρ_k up to the first lag with ρ_k
+    <= 0."""
     parts = np.split(residuals, np.cumsum(lengths)[:-1])
     size = max(len(part) for part in parts)
     padded = 2 ** int(np.ceil(np.log2(2 * size)))
@@ -114,10 +101,8 @@ class Identified:
 
 
 def record_of(run: Run, profile: WinchProfile) -> PulleyRecord:
-    """Both tensions and the nominal motion of a run of one winch, without rows with NaN.
-
-    Raises RunError without ``tension``, and without ``load`` and ``load_mass``.
-    """
+    """Both tensions and the nominal motion of a run of one winch, without rows with NaN; raises
+    RunError without ``tension``, and without ``load`` and ``load_mass``."""
     require_type(run, Run, "run")
     require_type(profile, WinchProfile, "profile")
     load = run["load"] if "load" in run.channels else None

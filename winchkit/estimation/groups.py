@@ -72,11 +72,9 @@ def sliding_share(wraps: Iterable[float]) -> float:
 
 
 def groups_of(profile: WinchProfile) -> tuple[PulleyGroup, ...]:
-    """The pulleys of a winch with the friction of its effect ``pulley-dahl``; empty without one.
-
-    Standard deviations of friction and stiffness are those of the table ``fitted`` of the effect;
-    NaN where it has none. Raises FileError for values that the effect cannot have.
-    """
+    """The pulleys of a winch with the friction of its effect ``pulley-dahl`` and the standard
+    deviations of its table ``fitted``, NaN without one; empty without the effect. Raises
+    FileError."""
     from winchkit.effects.bind import values_of
     from winchkit.effects.catalogue import load_catalogue
 

@@ -45,10 +45,8 @@ class Kernels:
 
 
 def _slopes(force: float, new: float, limit: float, reach: float, shape: float) -> Any:
-    """Derivatives of the exact step's result by F, by F_c, by q and by β, for forward motion.
-
-    ``reach`` q = σ|dx|/F_c; forces are positive along the motion, so that u = 1 − F/F_c.
-    """
+    """Derivatives of the exact step's result by F, by F_c, by ``reach`` q = σ|dx|/F_c and by β;
+    forces are positive along the motion, so that u = 1 − F/F_c."""
     u, w = 1.0 - force / limit, 1.0 - new / limit
     near, far = abs(u), abs(w)
     if near == 0.0 or far == 0.0:
@@ -175,6 +173,26 @@ PLAIN = _build("plain", lambda function: function, list)
 """Plain Python, always available."""
 
 
+def jit_of(plain: str) -> Function:
+    """Numba's compiler; UsageError, with the ``plain`` loops as another way, without numba."""
+    try:
+        from numba import njit
+    except ImportError:
+        raise UsageError(
+            "numba is not installed, which compiles the loops; pip install 'winchkit[fast]', "
+            f"or use plain Python with {plain}"
+        ) from None
+    compiler: Function = njit
+    return compiler
+
+
+def float_array(values: list[float]) -> Any:
+    """The sequence type of compiled loops."""
+    import numpy as np
+
+    return np.array(values, dtype=np.float64)
+
+
 def compiled() -> Kernels:
     """Compile the loops with numba and run each once.
 
@@ -189,19 +207,10 @@ def compiled() -> Kernels:
     UsageError
         Where numba is not installed (``pip install 'winchkit[fast]'``).
     """
-    try:
-        from numba import njit
-    except ImportError:
-        raise UsageError(
-            "numba is not installed, which compiles the loops; pip install 'winchkit[fast]', "
-            "or use plain Python with winchkit.estimation.PLAIN"
-        ) from None
     import numpy as np
 
-    def array(values: list[float]) -> Any:
-        return np.array(values, dtype=np.float64)
-
-    built = _build("numba", njit, array)
+    array = float_array
+    built = _build("numba", jit_of("winchkit.estimation.PLAIN"), array)
     pulleys, state = array([0.0, 0.1, 1e3, 1.0, 0.0]), array([0.0] * STATE_SLOTS)
     covariances, sums = array([0.0] * COVARIANCE_SLOTS), array([0.0] * 3)
     one, slopes = array([1.0]), np.zeros((1, 4))

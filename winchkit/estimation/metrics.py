@@ -9,11 +9,8 @@ from winchkit.errors import UsageError
 
 
 def overshoot(force: ArrayLike, target: float) -> float:
-    """Overshoot over a constant target, (max F − F_o)/F_o (Eq. 28).
-
-    ``force`` (n,): N. ``target``: F_o, N. Returns: NaN without a finite sample. Raises UsageError
-    for a target that is not positive.
-    """
+    """Overshoot over a constant target F_o, N, (max F − F_o)/F_o (Eq. 28); NaN without a finite
+    sample. Raises UsageError for a target that is not positive."""
     if not target > 0:
         raise UsageError(f"overshoot is relative to a target of {target:g} N; it must be above 0")
     values = np.asarray(force, dtype=float)
@@ -22,11 +19,8 @@ def overshoot(force: ArrayLike, target: float) -> float:
 
 
 def mean_relative_error(force: ArrayLike, target: ArrayLike) -> float:
-    """Mean of |F − F_o|/F_o (Eq. 29).
-
-    ``force`` (n,): N. ``target`` (n,): F_o, N. Returns: NaN without any. Raises UsageError for a
-    target that is not positive.
-    """
+    """Mean of |F − F_o|/F_o (Eq. 29); NaN without any. Raises UsageError for a target that is not
+    positive."""
     values, wanted = np.broadcast_arrays(
         np.asarray(force, dtype=float), np.asarray(target, dtype=float)
     )

@@ -2,10 +2,6 @@
 
 ``library`` indexes a folder of runs and diagnoses it, ``diagnosis`` compares the winches and finds
 what changed; ``report``, ``web`` and ``cli`` are the fleet's parts of the packages of these names.
-
-    index_library("runs")
-    history = library_history("runs", "bench-spiral")
-
 Each name is imported when it is first used.
 """
 

@@ -19,7 +19,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 DEAD_WRAPS = 2.0
 """Least number of turns on a drum under load (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
 
-Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue (:func:`wrap_ratio`).
+Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue.
 """
 _TURN = 2 * pi
 _ROUNDING = 1e-9
@@ -37,19 +37,11 @@ class Capacity:
     limited_by: Literal["width", "flange", ""]
     """Dimension of the drum that is reached first; empty where unknown."""
 
-    def remaining(self, turns: float) -> float:
-        """Turns that can still be wound in with ``turns`` on the drum; negative: overfilled."""
-        return self.turns - turns
-
 
 def capacity(profile: WinchProfile) -> Capacity:
-    """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``.
+    """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``; NaN where neither
+    is declared.
 
-    ``profile``: its drum declares ``width`` (grooved) or ``flange_radius`` (layered), m. Returns:
-    NaN where the dimension is not declared.
-
-    Notes
-    -----
     A grooved drum holds width/pitch turns in one layer (Eq. 12 of the winding-device paper). On a
     layered drum every turn lies on the one before; the cable's outer side may reach the flange.
     """
@@ -114,32 +106,16 @@ def length_at(profile: WinchProfile, turns: float) -> float:
 
 
 def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
-    """Free cable lengths between a full drum and the last two dead wraps, m.
-
-    ``profile``: with ``reference.cable_length``, m, and ``reference.wound_turns``. Returns: m;
-    ``shortest`` is NaN where neither width nor flange is declared, both are NaN without a
-    reference.
-    """
+    """Free cable lengths between a full drum and the last two dead wraps, m; NaN where no
+    dimension, or no reference, is declared."""
     return length_at(profile, capacity(profile).turns), length_at(profile, DEAD_WRAPS)
-
-
-def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
-    """Ratio of the cable's tension to the force on its clamp behind dead wraps.
-
-    ``friction``: coefficient μ between cable and drum. ``turns``: dead wraps n. Returns: e^(2π μ n)
-    (Euler-Eytelwein): 3.5 for two wraps at μ = 0.1.
-    """
-    return float(np.exp(_TURN * friction * turns))
 
 
 def drum_warnings(
     profile: WinchProfile, shortest: float | None = None, longest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Warnings about ends of the stroke that exceed the drum's capacity.
-
-    ``profile``: without ``reference.wound_turns`` there are no warnings. ``shortest``, ``longest``:
-    free lengths to which the winch may move, m; by default that of the reference.
-    """
+    """Warnings about ends of the stroke, by default the reference, that exceed the drum's capacity;
+    none without ``reference.wound_turns``."""
     reference = profile.reference
     if not reference.wound_turns:
         return

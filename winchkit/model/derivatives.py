@@ -40,19 +40,14 @@ estimated from what remains; with fewer samples differences are taken."""
 
 
 def direction(rate: Array, noise: float, creep: float) -> Array:
-    """Expected direction of a motion whose rate is known with noise.
+    """Mean of the sign, −1 to 1, of a rate (n,) that is known with a standard deviation ``noise``;
+    ``creep`` is a rate that has a direction whatever its noise.
 
-    ``rate`` (n,): rates of one run, in any unit. ``noise``: their standard deviation, in the same
-    unit. ``creep``: rate that has a direction whatever its noise, in the same unit. Returns (n,):
-    mean of the sign of the true rate, −1 to 1.
-
-    Notes
-    -----
     The true rate is zero with the probability p, else of a density f that is constant about zero.
-    The rate r = 0 ± σ is then that of a standstill with the probability p φ / (p φ + f), with
-    φ the normal density of r, and of a motion of the expected sign 2 Φ(r/σ) − 1 otherwise. f is
-    the density between three and six σ, and p the share of rates within three beyond what f
-    has there. σ is that of the noise, or of the rounding by presliding where that is more.
+    The rate r = 0 ± σ is then that of a standstill with the probability p φ / (p φ + f), with φ the
+    normal density of r, and of a motion of the expected sign 2 Φ(r/σ) − 1 otherwise. f is the
+    density between three and six σ, and p the share of rates within three beyond what f has there.
+    σ is that of the noise, or of the rounding by presliding where that is more.
     """
     from scipy.special import erf
 
@@ -70,13 +65,9 @@ def direction(rate: Array, noise: float, creep: float) -> Array:
 
 
 def is_smoother(measured: Array, differences: Array) -> bool:
-    """Whether a measured rate agrees with differences of the angle and has less noise.
-
-    Jitter of the time stamps adds noise to differences of the angle and none to the velocity that a
-    drive reports; a velocity that is quantised or filtered has more noise or does not agree.
-
-    ``measured`` (n,). ``differences`` (n,): rate by differences of the angle, in the same unit.
-    """
+    """Whether a measured rate agrees with differences of the angle and has less noise. Jitter of
+    the time stamps adds noise to differences and none to the velocity that a drive reports; one
+    that is quantised or filtered has more noise or does not agree."""
     spread = float(np.std(differences))
     if spread == 0.0 or float(np.std(measured - differences)) > _AGREES * spread:
         return False
@@ -85,11 +76,8 @@ def is_smoother(measured: Array, differences: Array) -> bool:
 
 @dataclass(frozen=True)
 class SamplingTimes:
-    """Sampling times, and derivatives of signals sampled at them.
-
-    Derivatives are differences where the samples are even. Where they are not, a smoothing spline
-    takes their place, whose weight is estimated from the measured angle or rate.
-    """
+    """Sampling times, and derivatives of signals sampled at them: differences where the samples are
+    even, else a smoothing spline whose weight is estimated from the measured angle or rate."""
 
     time: Array
     """(n,), s."""
@@ -130,12 +118,10 @@ class SamplingTimes:
 
     @cached_property
     def smoother(self) -> SmoothingSpline | None:
-        """Spline of the motor's rate and acceleration; None where these are differences.
-
-        That of uneven samples, or of even ones whose noise is a part of the acceleration that
-        biases an inertia. Other signals of even samples keep their differences: they may have
-        periods that the smoother of a steady motion would remove.
-        """
+        """Spline of the motor's rate and acceleration: that of uneven samples, or of even ones
+        whose noise biases an inertia; None where these are differences. Other signals of even
+        samples keep theirs: they may have periods that the smoother of a steady motion would
+        remove."""
         moved = self._moved
         if self.spline is not None or moved is None or len(self.time) < _LEAST_SAMPLES:
             return self.spline
@@ -164,11 +150,9 @@ class SamplingTimes:
 
     @cached_property
     def rate_noise(self) -> float:
-        """Standard deviation of the rate's noise.
-
-        That of its smoother, or from its fourth differences: a motion that is smooth over five
-        samples has none, and differences of a noisy angle have a quarter more.
-        """
+        """Standard deviation of the rate's noise: that of its smoother, or from its fourth
+        differences. A motion that is smooth over five samples has none, and differences of a noisy
+        angle have a quarter more."""
         if self.smoother is None:
             return _noise(self.rate)
         return self.smoother.typical_std(1 if self.measured_rate is None else 0)
@@ -244,11 +228,9 @@ class SamplingTimes:
         return np.pad(inner, step, mode="edge")
 
     def sharp_gradient(self, x: Array) -> Array:
-        """First derivative of sixth order over seven samples, (n,), for signals without noise.
-
-        The derivative by sample number is divided by that of time, so that straight lines stay
-        exact on uneven samples; it is of second order at the ends.
-        """
+        """First derivative of sixth order over seven samples, (n,), for signals without noise. It
+        is divided by that of time, so that straight lines stay exact on uneven samples; of second
+        order at the ends."""
         if self.spline is not None:
             return self.spline.smoothed(x, 1)
         return np.asarray(_by_number(x) / self._by_sample)
@@ -266,11 +248,10 @@ class SamplingTimes:
         return np.pad(inner, step, mode="edge")
 
     def curvature(self, x: Array) -> Array:
-        """Minus twelve times the smoothing error of a derivative ``x`` computed by this clock.
-
-        A second difference over a span h adds h²/12 of the second derivative. What a spline adds is
-        estimated by smoothing once more (twicing; Tukey, J. W., 1977, Exploratory Data Analysis).
-        """
+        """Minus twelve times the smoothing error of a derivative ``x`` by this clock. A second
+        difference over a span h adds h²/12 of the second derivative; what a spline adds is
+        estimated by smoothing once more (twicing; Tukey, J. W., 1977, Exploratory Data
+        Analysis)."""
         if self.spline is not None:
             return 12 * (self.spline.smoothed(x) - x)
         return self.span**2 * self.second_derivative(x)
@@ -296,11 +277,8 @@ def _by_number(x: Array) -> Array:
 
 
 def shifted(signal: Array, time: Array, later: float) -> Array:
-    """The signal ``later`` seconds later, by cubic Hermite interpolation; constant at the ends.
-
-    ``signal``, ``time`` (n,): signal, and its times, s. ``later``: shift, s; negative for an
-    earlier signal. Returns (n,): in the unit of the signal.
-    """
+    """The signal (n,) ``later`` seconds later, by cubic Hermite interpolation; constant at the
+    ends."""
     if later == 0.0 or len(time) < 2:
         return signal
     slope = np.gradient(signal, time)
@@ -314,16 +292,10 @@ def shifted(signal: Array, time: Array, later: float) -> Array:
 
 
 def with_turning_points(x: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Insert the extrema between samples into a signal.
+    """Insert the extrema between samples into a signal; also gives the places of the samples.
 
-    ``x`` (n,). Returns: ``signal`` (m,): samples and extrema in order of time; ``where`` (n,) of
-    int.
-
-    Notes
-    -----
     Between two samples a signal may exceed both, and the state of a hysteresis or a backlash
-    depends on its extremum. The extremum is that of the parabola through the three samples about
-    it.
+    depends on its extremum: that of the parabola through the three samples about it.
     """
     if len(x) < 3:
         return x, np.arange(len(x))

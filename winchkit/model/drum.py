@@ -144,10 +144,7 @@ class Squared:
 
 
 def drum_of(profile: WinchProfile) -> Spiral | Archimedean | Grooved | Squared:
-    """The winding law that a profile declares; its layers grow by the cable diameter by default.
-
-    Returns: winding law with dimensions in m.
-    """
+    """The winding law that a profile declares; its layers grow by the cable diameter by default."""
     spec = profile.drum
     growth = spec.layer_growth if spec.layer_growth is not None else profile.cable.diameter
     match spec.kind:

@@ -26,14 +26,9 @@ def normal_force(before: Array, after: Array, wrap: float) -> Array:
 def tension_after(
     before: ArrayLike, wrap: float, friction: ArrayLike, drag: ArrayLike = 0.0
 ) -> Array:
-    """Tension behind a pulley with Coulomb and viscous friction (Eq. 20–23).
+    """Tension T1 behind a pulley with T1 − T0 = μ N(T0, T1) + d (Eq. 20–23), N, of any shapes, by
+    the coefficient |μ| < 1 and the viscous drag d, signed.
 
-    ``before``: T0, N. All shapes broadcast. ``wrap``: wrap angle α, rad. ``friction``: coefficient
-    μ, signed, |μ| < 1. ``drag``: viscous force d = F_v v, signed, N. Returns: T1 with T1 − T0 = μ
-    N(T0, T1) + d, N.
-
-    Notes
-    -----
     Squaring gives a quadratic in T1; the root that is smooth at μ = 0 is taken.
     """
     first, m = np.asanyarray(before), np.asanyarray(friction)
@@ -46,38 +41,24 @@ def tension_after(
 
 
 def coulomb_ratio(friction: ArrayLike, wrap: float) -> Array:
-    """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1.
-
-    ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
-    of ``friction``.
-    """
+    """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1."""
     return tension_after(1.0, wrap, friction)
 
 
 def capstan_ratio(friction: Array, wrap: float) -> Array:
-    """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19).
-
-    ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
-    of ``friction``.
-    """
+    """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19)."""
     return np.asanyarray(np.exp(friction * wrap))
 
 
 def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float) -> Array:
-    """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s.
-
-    ``speed``: m/s, any shape. ``stribeck_speed``: vs, m/s. Returns: of the shape of ``speed``.
-    """
+    """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s."""
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
     return np.asanyarray(coulomb * (1 - fallen) + static * fallen)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:
-    """Dahl friction after a monotone move, exact at a constant limit F_c (Eq. 25).
-
-    ``force``: friction before the move, N. ``moved``: signed displacement, m. ``limit``: F_c, N.
-    ``stiffness``: σ, N/m. ``shape``: exponent β. Returns: N.
-    """
+    """Dahl friction, N, after a monotone move, signed, m, exact at a constant limit F_c, N (Eq.
+    25), with the stiffness σ, N/m, and the exponent β."""
     # Plain floats and branches only, since winchkit.estimation compiles this function.
     if limit <= 0.0:
         return 0.0
@@ -96,15 +77,8 @@ def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape:
 def dahl(
     position: Array, limit: Array, stiffness: float, shape: float = 1.0, start: float = 0.0
 ) -> Array:
-    """Dahl friction along a motion, with a limit F_c that may change.
-
-    ``position`` (n,): m. ``limit`` (n,): F_c, N. ``stiffness``: σ, N/m. ``shape``: exponent β.
-    ``start``: force at the first sample as a share of the limit, −1 to 1. Returns (n,): N.
-
-    Notes
-    -----
-    With β = 1 the step is linear in the force and solved by a scan, else sample by sample.
-    """
+    """Dahl friction (n,), N, along a motion, with a limit F_c (n,) that may change; ``start`` is
+    the first force as a share of the limit. With β = 1 the step is linear and solved by a scan."""
     moved = np.diff(position, prepend=position[:1])
     first = start * limit[0] if len(limit) else 0.0
     if shape == 1.0:
@@ -122,13 +96,9 @@ def dahl(
 def dahl_constant(
     position: Array, limit: float, stiffness: float, shape: float = 1.0, start: float = 0.0
 ) -> Array:
-    """Dahl friction along a motion at a constant limit F_c, parameters as of :func:`dahl`.
-
-    Notes
-    -----
-    The step is exact over any monotone section: the loop runs over the reversals, and all samples
-    between two of them are computed together.
-    """
+    """Dahl friction along a motion at a constant limit F_c, as :func:`dahl`. The step is exact over
+    any monotone section: the loop runs over the reversals, and all samples between two are computed
+    together."""
     out = np.zeros(len(position))
     if limit <= 0.0 or not len(position):
         return out

@@ -30,21 +30,14 @@ class GearStage:
 def worm_stage(
     starts: int, teeth: int, lead_angle: float, friction: float, pressure_angle: float = 0.0
 ) -> GearStage:
-    """Stage of a worm and a worm wheel, u = teeth/starts (Eq. 14 with z1 and z2 exchanged).
+    """Stage of a worm and a worm wheel, u = teeth/starts (Eq. 14 with z1 and z2 exchanged). Raises
+    UsageError for values outside their ranges.
 
-    ``lead_angle``: γ, rad. ``friction``: coefficient μ on the flanks. ``pressure_angle``: α_n, rad.
-    Raises UsageError for values outside their ranges.
-
-    Notes
-    -----
-    With ρ = atan(μ / cos α_n): η = tan γ / tan(γ + ρ), from wheel to worm tan(γ − ρ) / tan γ; the
-    stage is self-locking for γ ≤ ρ. Friction decreases with speed, oil and vibration (Mott relies
-    on self-locking below about 5° only): a self-locking gear is no brake.
-
-    References
-    ----------
-    Niemann, Winter, *Maschinenelemente* III, worm gears. Shigley's η = (cos α_n − μ tan γ)/(cos α_n
-    + μ cot γ) is the same. Mott, *Machine Elements in Mechanical Design*, 8-10.
+    With the lead angle γ and ρ = atan(μ / cos α_n): η = tan γ / tan(γ + ρ), from wheel to worm
+    tan(γ − ρ) / tan γ; the stage is self-locking for γ ≤ ρ. Friction decreases with speed, oil and
+    vibration (Mott, *Machine Elements in Mechanical Design*, 8-10, relies on self-locking below
+    about 5° only): a self-locking gear is no brake. Niemann, Winter, *Maschinenelemente* III;
+    Shigley's η = (cos α_n − μ tan γ)/(cos α_n + μ cot γ) is the same.
     """
     friction_angle = atan(friction / cos(pressure_angle))
     if starts < 1 or teeth < 1 or friction < 0.0 or not 0.0 < lead_angle < pi / 2 - friction_angle:

@@ -53,36 +53,19 @@ class Guide:
         """Travel of the guide since an empty drum, m."""
         return np.asarray(angle, dtype=float) * (self.lead / _TURN)
 
-    def aside(self, angle: ArrayLike, offset: float = 0.0) -> Array:
+    def aside(self, angle: ArrayLike) -> Array:
         """Axial offset of the guide from the point where the cable winds, m."""
-        return offset + np.asarray(angle, dtype=float) * (self.mismatch / _TURN)
+        return np.asarray(angle, dtype=float) * (self.mismatch / _TURN)
 
-    def fleet_angle(self, angle: ArrayLike, offset: float = 0.0) -> Array:
+    def fleet_angle(self, angle: ArrayLike) -> Array:
         """Angle between the cable and the plane perpendicular to the drum's axis, signed, rad."""
-        return np.arctan2(self.aside(angle, offset), self.distance)
+        return np.arctan2(self.aside(angle), self.distance)
 
-    def turns_within(self, fleet_angle: float, offset: float = 0.0) -> float:
+    def turns_within(self, fleet_angle: float) -> float:
         """Drum turns from an empty drum until the fleet angle exceeds a limit (rad), or inf."""
-        reach = self.distance * np.tan(fleet_angle)
-        if abs(offset) > reach:
-            return 0.0
         if self.mismatch == 0.0:
             return float("inf")
-        return float((reach - np.sign(self.mismatch) * offset) / abs(self.mismatch))
-
-    def turns_in(self, travel: float) -> float:
-        """Drum turns within a travel of the nut (m)."""
-        return travel / self.lead
-
-    def check(self, angle: float, travel: float) -> None:
-        """Raise UsageError where the guide would be driven beyond its ``travel`` (m)."""
-        there = float(self.position(angle))
-        if not 0.0 <= there <= travel:
-            raise UsageError(
-                f"the guide would stand at {there * 1e3:.1f} mm of its 0 to {travel * 1e3:.1f} mm "
-                f"with {angle / _TURN:.2f} turns on the drum; wind at most "
-                f"{self.turns_in(travel):.2f} turns"
-            )
+        return float(self.distance * np.tan(fleet_angle) / abs(self.mismatch))
 
 
 def guide_of(profile: WinchProfile) -> Guide:
@@ -96,11 +79,9 @@ def guide_of(profile: WinchProfile) -> Guide:
 def guide_warnings(
     profile: WinchProfile, shortest: float | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Warnings about a fleet angle beyond the limit on a grooved drum.
-
-    ``profile``: its guide is assumed to be above the cable on an empty drum. ``shortest``: shortest
-    free length of the winch, m; by default that of a full drum, else the reference.
-    """
+    """Warnings about a fleet angle beyond the limit on a grooved drum, down to the ``shortest``
+    free length, by default of a full drum; the guide is assumed to be above the cable on an empty
+    drum."""
     if profile.guide is None or not profile.drum.groove_pitch:
         return
     guide, limit = guide_of(profile), float(FLEET_LIMIT["grooved"])

@@ -72,10 +72,8 @@ class Line:
         return value
 
     def _force(self, force: Any, at: At) -> Any:
-        """Cable force from the one that the runs state or, where none is, from the cell's reading.
-
-        Effects of the cell are undone, the last first.
-        """
+        """Cable force from the one that the runs state or, where none is, from the cell's reading,
+        of which the cell's effects are undone, the last first."""
         if not at.reads_cell:
             return self._through(Stage.LOAD, force, at)
         for modifier in reversed(self._stages.get(Stage.CELL, ())):
@@ -194,13 +192,11 @@ class Line:
         return length
 
     def _load(self, motion: Motion, kinematics: WinchKinematics) -> Array:
-        """Load of a known mass that moves with the cable, kinematic effects included.
-
-        The cable speed is the arm (m/rad) times the motor's rate, so that a ripple of the arm is
-        differentiated once only. Motions that do not pass through the arm, such as slip, are
-        differentiated from the length. The acceleration by the cable's strain is left out: it would
-        need the fourth derivative of the angle, which is mostly noise.
-        """
+        """Load of a known mass that moves with the cable, kinematic effects included. The speed is
+        the arm times the motor's rate, so that a ripple of the arm is differentiated once only;
+        motions that do not pass through the arm are differentiated from the length. The
+        acceleration by the cable's strain is left out: it would need the fourth derivative of the
+        angle, which is mostly noise."""
         load = motion.load
         assert load is not None
         if motion.load_mass is None or not any(m.stage <= Stage.WOUND for m in self.modifiers):
@@ -257,11 +253,9 @@ class Line:
         tension: Array,
         temperature: Array,
     ) -> At:
-        """Inputs of the modifiers for single samples without a time series, SI and degC, (n,).
-
+        """Inputs of the modifiers for single samples (n,) without a time series, SI and degC.
         Accelerations are zero, and directions smooth below the creep rates, so that a controller's
-        friction has no step at standstill.
-        """
+        friction has no step at standstill."""
         drum_angle, length = self._nominal_length(motor_angle)
         speed = self._nominal_arm(motor_angle) * motor_rate
         return At(
@@ -291,12 +285,12 @@ class Line:
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
-        at = self._at_rest(motor_angle, tension)
+        at = self.at_rest(motor_angle, tension)
         return float(self.indicated_length(at, self.kinematics(at))[0])
 
     def arm(self, motor_angle: float) -> float:
         """Cable wound in per motor angle, signed by the gearbox's direction, m/rad."""
-        return float(self.kinematics(self._at_rest(motor_angle, 0.0)).arm[0])
+        return float(self.kinematics(self.at_rest(motor_angle)).arm[0])
 
     def nominal_motor_angle(self, cable_length: Array) -> Array:
         """Motor angles of the nominal line at cable lengths (m), any shape, rad."""
@@ -308,20 +302,24 @@ class Line:
         return np.asanyarray(profile.reference.motor_angle + turned)
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
-        """Motor angle at a cable length (m) under a tension (N), rad.
-
-        Closed form for the nominal line; with effects, Newton's method starting from it.
-        """
+        """Motor angle at a cable length (m) under a tension (N), rad; with effects by Newton's
+        method from the closed form of the nominal line."""
         angle = float(self.nominal_motor_angle(np.asarray(cable_length)))
         for _ in range(_NEWTON_STEPS if self.modifiers else 0):
             excess = self.cable_length(angle, tension) - cable_length
             angle += excess / self.arm(angle)
         return angle
 
-    def _at_rest(self, motor_angle: float, tension: float) -> At:
-        """One sample at rest, at 20 degrees Celsius."""
-        angle, force, zero = np.array([motor_angle]), np.array([tension]), np.zeros(1)
-        return self.moments(zero, angle, zero, force, np.array([20.0]))
+    def at_rest(
+        self,
+        motor_angle: Array | float,
+        tension: Array | float = 0.0,
+        temperature: Array | float = 20.0,
+    ) -> At:
+        """Samples at rest, (n,), N and degrees Celsius."""
+        angle = np.atleast_1d(np.asarray(motor_angle, dtype=float))
+        zero = np.zeros_like(angle)
+        return self.moments(zero, angle, zero, zero + tension, zero + temperature)
 
     def lengths_and_arms(self, at: At) -> tuple[Array, Array]:
         """Cable lengths at rest, (n,), m, and cable wound in per motor angle there, m/rad."""
@@ -331,5 +329,5 @@ class Line:
     @property
     def drum(self) -> Drum:
         """The drum with its modifiers."""
-        drum: Drum = self._through(Stage.DRUM, self._drum, self._at_rest(0.0, 0.0))
+        drum: Drum = self._through(Stage.DRUM, self._drum, self.at_rest(0.0))
         return drum

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import cos, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -18,12 +18,7 @@ from numpy.typing import ArrayLike
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.friction import (
-    capstan_ratio,
-    dahl_step,
-    stribeck,
-    tension_after,
-)
+from winchkit.model.friction import capstan_ratio, stribeck, tension_after
 
 Step = Callable[[float, float, float, float, float], float]
 PulleyStep = Callable[..., Any]
@@ -66,12 +61,8 @@ class Bearings:
 def over_pulleys(
     tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike, law: Eyelets | Bearings
 ) -> Array:
-    """Tension behind a chain of pulleys without memory.
-
-    ``tension`` (n,): known tension in front of the first pulley, N. ``wraps``: wrap angles in the
-    order of computation, rad. ``towards`` (n,): cable speed in the direction of computation, m/s.
-    Returns (n,): tension behind the last pulley, N.
-    """
+    """Tension (n,), N, behind a chain of pulleys without memory, with wraps in the order of
+    computation and cable speeds (n,) towards it, m/s."""
     carried, speed = np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
     for wrap in wraps:
         carried = law.after(carried, wrap, speed)
@@ -79,12 +70,8 @@ def over_pulleys(
 
 
 def presliding_step(step: Step) -> PulleyStep:
-    """Build the Dahl friction of one pulley over one move from ``step`` (:func:`dahl_step`).
-
-    The same source runs as plain Python or, with a compiled ``step``, is compiled by numba.
-
-    ``step``: function as :func:`dahl_step`.
-    """
+    """Build the Dahl friction of one pulley over one move from ``step`` (:func:`dahl_step`), plain
+    or, with a compiled ``step``, for numba."""
 
     def pulley_step(  # noqa: PLR0917 - numba takes no keywords
         force: float,
@@ -95,10 +82,8 @@ def presliding_step(step: Step) -> PulleyStep:
         stiffness: float,
         shape: float,
     ) -> tuple[float, float]:
-        """New friction force and the normal force that limits it, N.
-
-        The limit μ N(T, T + F) depends on the friction itself; one correction of order μ solves it.
-        """
+        """New friction force and the normal force that limits it, N. The limit μ N(T, T + F)
+        depends on the friction itself; one correction of order μ solves it."""
         normal = 0.0
         new = force
         for _ in range(2):
@@ -111,52 +96,15 @@ def presliding_step(step: Step) -> PulleyStep:
     return pulley_step
 
 
-@dataclass(frozen=True)
-class DahlPulleys:
-    """Pulleys whose friction builds up with distance before it slides (Dahl, Eq. 25)."""
-
-    friction: float
-    stiffness: float
-    """σ, N/m."""
-    shape: float = 1.0
-    """β."""
-
-    def over(self, tension: ArrayLike, wraps: Sequence[float], towards: ArrayLike) -> Array:
-        """Tension behind all pulleys along cable positions ``towards`` (m); arrays (n,), N.
-
-        Friction is zero at the first sample.
-        """
-        carried, position = np.broadcast_arrays(
-            np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
-        )
-        moved = np.diff(position, prepend=position[:1])
-        for wrap in wraps:
-            carried = carried + self._forces(carried, moved, cos(wrap))
-        return np.asarray(carried)
-
-    def _forces(self, tension: Array, moved: Array, cosine: float) -> Array:
-        step = presliding_step(dahl_step)
-        force, out = 0.0, []
-        for t, d in zip(tension.tolist(), moved.tolist(), strict=True):
-            force, _ = step(force, t, d, cosine, self.friction, self.stiffness, self.shape)
-            out.append(force)
-        return np.array(out)
-
-
 def eq27_tension(
     platform: ArrayLike, towards: ArrayLike, loss: Sequence[float], stiffness: float
 ) -> Array:
-    """Solve Eq. 27 of the winding-device paper for the tension at the load cell.
+    """Solve Eq. 27 of the winding-device paper, T + Σ s T λ_j (1 − e^(−σ|x|/(λ_j T))) = T_p, for
+    the tension T at the load cell, (n,), N, by Newton's method from T_p: the left side increases
+    with T.
 
-    ``platform`` (n,): tension T_p at the platform, N. ``towards`` (n,): displacement x of the cable
-    towards the platform since friction was zero, m. ``loss``: loss factors λ_j > 0 of the pulleys,
-    Σ λ < 1. ``stiffness``: presliding stiffness σ, N/m. Returns (n,): T, N, with T + Σ s T λ_j (1 −
-    e^(−σ|x|/(λ_j T))) = T_p and s the sign of x. Raises UsageError for loss factors without a
-    solution.
-
-    Notes
-    -----
-    Newton's method from T = T_p; it converges since the left side increases with T.
+    x is the displacement of the cable towards the platform since friction was zero, m, s its sign.
+    Raises UsageError for loss factors λ_j that are not above 0 with a sum below 1.
     """
     if not all(share > 0 for share in loss) or sum(loss) >= 1:
         raise UsageError(

@@ -67,10 +67,7 @@ def angles_of(rotation: ArrayLike) -> Array:
 
 
 def skew(vector: ArrayLike) -> Array:
-    """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3).
-
-    ``vector`` (..., 3): vectors v. Returns (..., 3, 3): [v]×.
-    """
+    """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3)."""
     v = np.asarray(vector, dtype=float)
     out = np.zeros((*v.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
@@ -79,10 +76,7 @@ def skew(vector: ArrayLike) -> Array:
 
 
 def rotation_by(vector: ArrayLike) -> Array:
-    """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3).
-
-    ``vector`` (..., 3): rotation vectors ω, rad. Returns: (..., 3, 3).
-    """
+    """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3)."""
     v = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     cross = skew(v)
@@ -94,21 +88,14 @@ def rotation_by(vector: ArrayLike) -> Array:
 
 def mean_rotation(rotation: Array) -> Array:
     """Rotation nearest to the mean of rotation matrices (p, 3, 3), in the Frobenius norm; (3, 3).
-
-    References
-    ----------
     Moakher, M. (2002). Means and averaging in the group of rotations. SIAM J. Matrix Anal. Appl.
-    24, 1-16.
-    """
+    24."""
     left, _, right = np.linalg.svd(np.mean(rotation, axis=0))
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
 def rotation_vector(rotation: ArrayLike) -> Array:
-    """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad.
-
-    ``rotation`` (..., 3, 3). Returns (..., 3): rad, of length at most π.
-    """
+    """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad."""
     q = quaternion_of(rotation)
     sine = np.linalg.norm(q[..., 1:], axis=-1)
     angle = 2 * np.arctan2(sine, q[..., 0])
@@ -118,13 +105,9 @@ def rotation_vector(rotation: ArrayLike) -> Array:
 
 
 def rotation_rates(vector: Array, first: Array, second: Array) -> tuple[Array, Array]:
-    """Angular velocity and acceleration of R = exp([φ]×) R0 with a changing rotation vector φ.
+    """Angular velocity ω, dR = [ω]× R, and its derivative of R = exp([φ]×) R0, by φ and its
+    derivatives φ' and φ'' by any parameter, (..., 3).
 
-    ``vector``, ``first``, ``second`` (..., 3): φ, rad, and its derivatives by any parameter.
-    Returns (..., 3): ω with dR = [ω]× R, base axes, and its derivative.
-
-    Notes
-    -----
     ω = φ' + b φ × φ' + c φ × (φ × φ'), with b = (1 − cos θ)/θ², c = (θ − sin θ)/θ³ and θ = ‖φ‖.
     """
     square = np.sum(vector * vector, axis=-1, keepdims=True)
@@ -155,10 +138,7 @@ def rotation_rates(vector: Array, first: Array, second: Array) -> tuple[Array, A
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
-    """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3).
-
-    ``quaternion`` (..., 4): w, x, y, z, of any length except zero. Returns: (..., 3, 3).
-    """
+    """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3)."""
     q = np.asarray(quaternion, dtype=float)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)
     cross = skew(q[..., 1:])

@@ -192,17 +192,14 @@ class SmoothingSpline:
 
     @classmethod
     def fit(cls, time: Array, signal: Array) -> SmoothingSpline:
-        """Smoother whose weight maximises the restricted likelihood of a signal.
+        """Smoother whose weight maximises the restricted likelihood of a signal (n,) without NaN, n
+        ≥ 4.
 
-        ``time`` (n,): s, increasing, n ≥ 4. ``signal`` (n,): without NaN.
-
-        Notes
-        -----
         The noise is at least that of the signal's rounding, q/√12 for a step q: a staircase is no
         motion. Where the signal changes by less than q between samples, the rounding errors of
         neighbours are alike; every k-th sample, between which it changes by q, then determines the
-        weight and the knots, and each of all samples counts as a k-th of one: noise k σ², weight
-        k times.
+        weight and the knots, and each of all samples counts as a k-th of one: noise k σ², weight k
+        times.
         """
         from scipy.optimize import minimize_scalar
 
@@ -243,32 +240,21 @@ class SmoothingSpline:
         return cls(design, weight, float(np.sqrt(variance)), deviance)
 
     def smoothed(self, signal: Array, derivative: int = 0) -> Array:
-        """Smoothed signal or one of its derivatives at the samples.
-
-        ``signal`` (n,). ``derivative``: order, 0 to 2. Returns (n,): in the unit of the signal over
-        s to the power of the order.
-        """
+        """Smoothed signal (n,) or its first or second derivative at the samples."""
         return self._at_samples(self._coefficients(signal), derivative)
 
     @property
     def reach(self) -> float:
-        """Half width of the smoother's kernel in samples, at least a knot's.
-
-        With m samples per knot it is (λ/m) to the power of a sixth, in knots.
-        """
+        """Half width of the smoother's kernel in samples, at least a knot's: (λ/m)^⅙ knots with m
+        samples per knot."""
         return self.design.samples_per_knot * max(1.0, self._smoothing_length)
 
     @property
     def support(self) -> float:
         """Samples to either side beyond which a sample acts by less than 2 % of its kernel's peak.
-
-        The kernel falls by e in 2 (λ/m)^⅙ knots. That of an interpolating spline of degree five
-        falls by the largest root of its cardinal spline, 0.43, a knot.
-
-        References
-        ----------
-        Schoenberg, I. J. (1973). Cardinal Spline Interpolation. SIAM.
-        """
+        The kernel falls by e in 2 (λ/m)^⅙ knots, an interpolating spline's of degree five by the
+        largest root of its cardinal spline, 0.43, a knot (Schoenberg, I. J., 1973, Cardinal Spline
+        Interpolation)."""
         decay = max(2 * self._smoothing_length, 1 / float(np.log(1 / _CARDINAL_ROOT)))
         return self.design.samples_per_knot * float(np.log(1 / _NEGLIGIBLE)) * decay
 
@@ -279,14 +265,9 @@ class SmoothingSpline:
         return float(relative ** (1 / (2 * (len(_PENALTY) - 1))))
 
     def std(self, derivative: int) -> Array:
-        """Standard deviation of a derivative of the signal to which the weight was fitted.
-
-        ``derivative``: order, 0 to 2. Returns: (n,).
-
-        Notes
-        -----
-        σ² w' (B'B + λ D'D)⁻¹ w with the band of the inverse by Takahashi's recursion.
-        """
+        """Standard deviation (n,) of a derivative, order 0 to 2, of the signal to which the weight
+        was fitted: σ² w' (B'B + λ D'D)⁻¹ w with the band of the inverse by Takahashi's
+        recursion."""
         inverse = self._inverse_band
         first, weights = self.design.basis(derivative)
         total = np.zeros(len(first))
@@ -302,20 +283,12 @@ class SmoothingSpline:
         return np.asarray(self.noise * np.sqrt(np.maximum(total, 0.0)))
 
     def typical_std(self, derivative: int) -> float:
-        """Standard deviation of a derivative far from the ends of even samples.
+        """Standard deviation of a derivative, order r of 0 to 2, far from the ends of even samples.
 
-        ``derivative``: order, 0 to 2. Returns: as :meth:`std`, without its recursion.
-
-        Notes
-        -----
-        σ² times the integral of ω²ʳ / (m + λ ω⁶) over ω/2π, ω in radians per knot, for the order r
-        and m samples per knot: the posterior variance by the equivalent kernel, for kernels of more
-        than one sample.
-
-        References
-        ----------
-        Silverman, B. W. (1984). Spline smoothing: the equivalent variable kernel method. Annals of
-        Statistics 12, 898-916.
+        σ² times the integral of ω²ʳ / (m + λ ω⁶) over ω/2π, ω in radians per knot, for m samples
+        per knot: the posterior variance by the equivalent kernel, for kernels of more than one
+        sample (Silverman, B. W., 1984, Spline smoothing: the equivalent variable kernel method.
+        Annals of Statistics 12).
         """
         order = (2 * derivative + 1) / 6
         density = self.design.samples_per_knot

@@ -4,13 +4,7 @@
 ``identification`` and ``mistakes`` (of tables) what ``calibration`` and ``diagnosis`` share;
 ``bench`` moves the platform, ``sim`` simulates it; ``effects``, ``files``, ``report``, ``web`` and
 ``cli`` are the robot's parts of the packages of these names, and ``export`` writes a robot for
-other programs.
-
-    robot = robot_of(read_robot("cabtive"))
-    angles = robot.motor_angles(Pose(position, rotation))
-    found = robot.poses_at(angles)
-
-Each name is imported when it is first used.
+other programs. Each name is imported when it is first used.
 """
 
 from __future__ import annotations

@@ -21,10 +21,8 @@ _FILE = "sim-bench.toml"
 def declared(
     name: str | Path | None, winches: Mapping[str, Mapping[str, Any]] | None, folder: Path
 ) -> SimBench:
-    """Read a simulated bench; one with ``winches`` is first written as a file into ``folder``.
-
-    Raises FileError, UsageError.
-    """
+    """Read a simulated bench; one with ``winches`` is first written into ``folder``. Raises
+    FileError, UsageError."""
     path = find("sim", str(name or _DEFAULT))
     if winches is None:
         if name is None:
@@ -44,10 +42,8 @@ def declared(
 
 
 def _wired(pattern: Mapping[str, Any], place: int, beside: Path) -> dict[str, Any]:
-    """The pattern with addresses of its own, so that any number of winches share its buses.
-
-    Files are named so that they are found from elsewhere.
-    """
+    """The pattern with addresses of its own, so that any number of winches share its buses, and
+    files named so that they are found from elsewhere."""
     wired = dict(pattern)
     wired["profile"] = str(find("profiles", pattern["profile"], beside=beside).resolve())
     roles = [role for role, ref in pattern.items() if isinstance(ref, dict) and "device" in ref]

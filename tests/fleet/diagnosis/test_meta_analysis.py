@@ -13,7 +13,7 @@ from scipy.stats import kstest
 
 from diagnosis_runs import CATALOGUE
 from winchkit.diagnosis.results import Detectable, Diagnosis, Estimate, Place, Step
-from winchkit.fleet.diagnosis.meta_analysis import Pooled, alarms, pooled, shared_effects
+from winchkit.fleet.diagnosis.meta_analysis import alarms, pooled, shared_effects
 from winchkit.fleet.report.comparison import effect_text, shared_effects_text
 
 NAMES = "ABCDEFGH"
@@ -223,7 +223,6 @@ def test_as_json() -> None:
     }  # fmt: skip
     keys = {"apart" if name == "outlying" else name for name in vars(one.parameters["torque"])}
     assert set(told["parameters"]["torque"]) == keys
-    assert isinstance(one.parameters["torque"], Pooled)
 
 
 def test_an_alarm_of_one_of_eight_is_eight_times_as_likely() -> None:

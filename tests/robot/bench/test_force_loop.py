@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +44,19 @@ WANTED = np.full(8, 500.0)
 
 ROBOT: Robot = robot_of(read_robot(find("profiles", "winding-device-8")))
 SLACK = 30.0
+
+
+@contextmanager
+def simulated(
+    robot: str = "winding-device-robot", cycle: float = CYCLE, **wiring: Any
+) -> Iterator[tuple[LiveBench, SimulatedClock]]:
+    """A live robot with these numbers of ``[robot]``, and its clock."""
+    sim = read_simbench(find("sim", robot))
+    assert sim.bench.robot is not None
+    own = replace(sim.bench.robot, **wiring)
+    sim, clock = replace(sim, bench=replace(sim.bench, cycle=cycle, robot=own)), SimulatedClock()
+    with LiveBench(sim, seed=2, simulated_time=clock) as live:
+        yield live, clock
 
 
 @pytest.fixture(scope="module")
@@ -319,12 +335,10 @@ def test_without_a_cell_at_each_winch_it_is_refused(bench: Bench) -> None:
 @pytest.mark.slow
 def test_forces_that_the_drives_do_not_give_are_refused_before_anything_moves() -> None:
     """The middle of 5 N and 220 N at a drum of 60 mm is 6.75 N m, of 6 N m."""
-    sim = read_simbench(find("sim", "cabtive-robot"))
-    assert sim.bench.robot is not None
-    wiring = replace(sim.bench.robot, tension=(5.0, 220.0))
-    sim = replace(sim, bench=replace(sim.bench, cycle=0.04, robot=wiring))
-    clock = SimulatedClock()
-    with LiveBench(sim, simulated_time=clock) as live, open_bench(live.bench_spec, clock) as bench:
+    with (
+        simulated("cabtive-robot", 0.04, tension=(5.0, 220.0)) as (live, clock),
+        open_bench(live.bench_spec, clock) as bench,
+    ):
         clock.sleep(0.5)
         with pytest.raises(
             NotPermitted, match=r"needs 6\.\d+ N m .* the drive gives 6 N m at most"
@@ -337,12 +351,6 @@ def test_forces_that_the_drives_do_not_give_are_refused_before_anything_moves() 
 
 @pytest.mark.slow
 def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(structure: Array) -> None:
-    sim = read_simbench(find("sim", "winding-device-robot"))
-    assert sim.bench.robot is not None
-    bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
-    wiring = replace(sim.bench.robot, tension_trim="end", axial_stiffness=250e3)
-    sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
-    clock = SimulatedClock()
     null = null_space(structure)
 
     def missing() -> float:
@@ -352,7 +360,7 @@ def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(structure: Array
         return float(np.linalg.norm(null @ null.T @ (force - 502.5)))
 
     with (
-        LiveBench(sim, seed=2, simulated_time=clock) as live,
+        simulated(tension_trim="end", axial_stiffness=250e3) as (live, clock),
         open_bench(live.bench_spec, clock) as bench,
     ):
         clock.sleep(0.2)
@@ -400,14 +408,7 @@ def test_the_pose_stays_that_of_the_plan_where_cells_correct_along_it(tmp_path: 
     Without that millimetres of elongation turn the pose by the lengths: this robot's cables hold
     its rotation about z 50 times more softly than its position.
     """
-    sim = read_simbench(find("sim", "winding-device-robot"))
-    assert sim.bench.robot is not None
-    bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
-    wiring = replace(sim.bench.robot, tension_trim="along", axial_stiffness=200e3)
-    sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
-    clock = SimulatedClock()
-    with LiveBench(sim, seed=2, simulated_time=clock) as live:
-        assert live.robot is not None
+    with simulated(tension_trim="along", axial_stiffness=200e3) as (live, clock):
         spec = replace(live.bench_spec, latch_file=str(tmp_path / "bench.trip.json"))
 
         def off(platform: Platform) -> float:
@@ -437,14 +438,8 @@ def test_the_pose_stays_that_of_the_plan_where_cells_correct_along_it(tmp_path: 
 @pytest.mark.parametrize("trim", ["none", "along"])
 def test_a_stop_before_a_correction_starts_leaves_pose_and_trims(trim: str) -> None:
     """Once they were NaN after a stop while the drives were being enabled, and in the record."""
-    sim = read_simbench(find("sim", "winding-device-robot"))
-    assert sim.bench.robot is not None
-    bus = {**sim.bench.bus, "can": replace(sim.bench.bus["can"], heartbeat=0.1)}
-    wiring = replace(sim.bench.robot, tension_trim=trim, axial_stiffness=200e3)
-    sim = replace(sim, bench=replace(sim.bench, cycle=CYCLE, bus=bus, robot=wiring))
-    clock = SimulatedClock()
     with (
-        LiveBench(sim, seed=2, simulated_time=clock) as live,
+        simulated(tension_trim=trim, axial_stiffness=200e3) as (live, clock),
         open_bench(live.bench_spec, clock) as bench,
     ):
         clock.sleep(0.5)

@@ -54,6 +54,16 @@ def residuals(made: RobotEquations, state: BundleState) -> dict[str, Array]:
     return {rows.kind: rows.residual for rows in made.rows(state)}
 
 
+def slopes(made: RobotEquations, state: BundleState, k: int, size: float) -> dict[str, Array]:
+    """Differences of the residuals over twice a step of the parameter k, divided by them."""
+    step = np.zeros(len(state.values))
+    step[k] = size
+    up, down = (
+        residuals(made, BundleState(state.values + change, state.pose)) for change in (step, -step)
+    )
+    return {kind: (up[kind] - down[kind]) / (2 * size) for kind in up}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
@@ -73,17 +83,14 @@ def test_derivatives_are_those_of_the_residuals(effects: tuple[str, ...]) -> Non
     derived = {r.kind: r.by_values for r in made.rows(state) if r.by_values is not None}
     assert len(derived) > 1
     for k in np.flatnonzero(made.parameters.free):
-        step = np.zeros(len(state.values))
-        step[k] = 1e-3 * made.parameters.std[k]
-        up = residuals(made, BundleState(state.values + step, state.pose))
-        down = residuals(made, BundleState(state.values - step, state.pose))
+        std = made.parameters.std[k]
+        slope = slopes(made, state, k, 1e-3 * std)
         for kind, by_values in derived.items():
             # Forces by geometry are left out of the balance's derivatives, by design.
             if kind == "balance" and not made.parameters.all[k].name.startswith("payload"):
                 continue
-            slope = (up[kind] - down[kind]) / 2e-3
-            own = by_values[..., k] * made.parameters.std[k]
-            np.testing.assert_allclose(own, slope, rtol=1e-5, atol=1e-8)
+            own = by_values[..., k] * std
+            np.testing.assert_allclose(own, slope[kind] * std, rtol=1e-5, atol=1e-8)
 
 
 def test_derivatives_by_the_pose_are_those_of_the_residuals() -> None:
@@ -112,13 +119,8 @@ def test_computed_forces_change_strain_by_the_payload_as_they_should() -> None:
     closure = next(r for r in made.rows(state) if r.kind == "closure")
     assert closure.by_values is not None
     for k in (*block["payload_mass"], *block["payload_centre"]):
-        step = np.zeros(len(state.values))
-        step[k] = 1e-4
-        up = residuals(made, BundleState(state.values + step, state.pose))["closure"]
-        down = residuals(made, BundleState(state.values - step, state.pose))["closure"]
-        np.testing.assert_allclose(
-            closure.by_values[..., k], (up - down) / 2e-4, rtol=1e-4, atol=1e-9
-        )
+        slope = slopes(made, state, k, 1e-4)["closure"]
+        np.testing.assert_allclose(closure.by_values[..., k], slope, rtol=1e-4, atol=1e-9)
 
 
 def test_the_reduced_fit_is_the_minimum_of_the_whole_one() -> None:
@@ -230,11 +232,8 @@ def test_gains_of_cells_and_scales_of_counters_have_the_derivatives_of_their_res
     state = BundleState(values, state.pose)
     for block in ("cell_gain", "length_scale", "length_offset"):
         for k in made.parameters.block[block]:
-            step = np.zeros(len(values))
-            step[k] = 1e-6
-            up = residuals(made, BundleState(values + step, state.pose))
-            down = residuals(made, BundleState(values - step, state.pose))
+            by_difference = slopes(made, state, k, 1e-6)
             for rows_ in made.rows(state):
-                slope = np.nan_to_num((up[rows_.kind] - down[rows_.kind]) / 2e-6)
+                slope = np.nan_to_num(by_difference[rows_.kind])
                 found = np.zeros_like(slope) if rows_.by_values is None else rows_.by_values[..., k]
                 np.testing.assert_allclose(np.nan_to_num(found), slope, rtol=1e-6, atol=1e-6)

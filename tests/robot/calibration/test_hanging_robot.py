@@ -68,18 +68,23 @@ def wound_in(line: int, shorter: float) -> float:
     return float(brentq(lambda a: truth().wound(line, begin + a) - at_home - shorter, -20, 20))
 
 
+def at_rest(rng: np.random.Generator, count: int, reach: float) -> tuple[Array, Array, Array]:
+    """The home pose, poses at rest about it, and the motor angles there."""
+    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
+    poses = []
+    for _ in range(count):
+        about = home + np.concatenate([rng.uniform(-reach, reach, 3), np.zeros(3)])
+        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
+    shorter = ropes(home) - np.array([ropes(pose) for pose in poses])
+    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter.tolist()])
+    return home, np.array(poses), motor
+
+
 @lru_cache(maxsize=1)
 def hanging() -> tuple[Robot, MeasuredPoses]:
     """The nominal robot, and measurements of the true one."""
     rng = np.random.default_rng(3)
-    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
-    poses = []
-    for _ in range(COUNT):
-        about = home + np.concatenate([rng.uniform(-0.1, 0.1, 3), np.zeros(3)])
-        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
-    shorter = ropes(home) - np.array([ropes(pose) for pose in poses])
-    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter.tolist()])
-    seen = np.array(poses)
+    home, seen, motor = at_rest(rng, COUNT, 0.1)
     nothing = np.full((COUNT, ROPES), np.nan)
     measured = MeasuredPoses(
         motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
@@ -167,16 +172,10 @@ def forces(pose: Array) -> Array:
 def without_tracker(count: int, seed: int) -> tuple[Robot, MeasuredPoses]:
     """The true robot, and swivels, cells and roll and pitch of an IMU at poses at rest."""
     rng = np.random.default_rng(seed)
-    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
-    poses = []
-    for _ in range(count):
-        about = home + np.concatenate([rng.uniform(-0.12, 0.12, 3), np.zeros(3)])
-        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
-    shorter = (ropes(home) - np.array([ropes(pose) for pose in poses])).tolist()
-    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter])
+    home, poses, motor = at_rest(rng, count, 0.12)
     swivel = np.array([[swivel_of(pose, i) + 0.3 * i - 1 for i in range(ROPES)] for pose in poses])
     pull = np.array([forces(pose) for pose in poses])
-    angles = np.array(poses)[:, 3:] + rng.normal(0, 5e-4, (count, 3))
+    angles = poses[:, 3:] + rng.normal(0, 5e-4, (count, 3))
     angles[:, 2] = np.nan
     nothing = np.full((count, ROPES), np.nan)
     measured = MeasuredPoses(

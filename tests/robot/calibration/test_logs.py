@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
+from model_files import answer
 from robot_poses.hanging import Hanging
-from winchkit.cli import main
 from winchkit.schema.read import read_robot
 
 pytestmark = pytest.mark.slow
@@ -33,11 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def calibrated(folder: Path, log: str) -> dict[str, Any]:
     out = folder / f"new-{log}.toml"
-    arguments = ["calibrate", folder / "robot.toml", folder / log, "-o", out, "--json"]
-    result = CliRunner().invoke(main, [str(a) for a in arguments])
-    assert result.exit_code == 0, result.output
-    found: dict[str, Any] = json.loads(result.stdout)
-    return found
+    return answer("calibrate", folder / "robot.toml", folder / log, "-o", out)
 
 
 def test_ratio_and_gain_are_found_with_their_lines(folder: Path) -> None:

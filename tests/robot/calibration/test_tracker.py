@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from calibration_cases import EXACT, measured, robot, rows
+from model_files import answer, invoke
 from robot_poses.station import Station, about
 from robot_poses.truth import csv
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.robot import robot_of
 from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.prediction import rms
@@ -137,10 +135,6 @@ def test_a_known_frame_and_reflector_are_used_as_declared() -> None:
     assert rms(found.validation_after.distance) < 4e-5
 
 
-def invoke(*arguments: object) -> Any:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 @pytest.mark.parametrize("datum", ["robot", "tracker"])
 def test_the_written_profile_predicts_in_the_datum(datum: str, tmp_path: Path) -> None:
     station = Station(37.0, shift=(0.1, 0.2, -0.3))
@@ -149,9 +143,7 @@ def test_the_written_profile_predicts_in_the_datum(datum: str, tmp_path: Path) -
     (tmp_path / "cabtive-winch.toml").write_text(find("profiles", "cabtive-winch").read_text())
     table = f'\n[instrument.tracker]\nframe = "unknown"\ndatum = "{datum}"\n'
     profile.write_text(find("profiles", "cabtive").read_text() + table)
-    result = invoke("calibrate", profile, run, "-o", new, "--json")
-    assert result.exit_code == 0, result.output
-    told = json.loads(result.stdout)
+    told = answer("calibrate", profile, run, "-o", new)
     assert told["instruments"]["datum"] == datum
     assert told["refused"] is None
     (frame,) = told["instruments"]["frames"].values()

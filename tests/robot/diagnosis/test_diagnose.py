@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
+from model_files import answer, invoke
 from robot_poses.cases import CASES
-from robot_poses.hidden import BASE, Case, profile_text, record
+from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import HOME, turn
-from winchkit.cli import main
 from winchkit.schema.read import read_robot
 
 BY_NAME = {case.name: case for case in CASES}
-
-
-def call(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
-def answered(*arguments: object) -> dict[str, Any]:
-    result = call(*arguments, "--json")
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout)  # type: ignore[no-any-return]
 
 
 def files(folder: Path, case: str, **how: Any) -> tuple[Path, Path]:
@@ -34,6 +22,11 @@ def files(folder: Path, case: str, **how: Any) -> tuple[Path, Path]:
     profile = folder / "robot.toml"
     profile.write_text(profile_text())
     return profile, record(BY_NAME[case], folder, "poses.csv", **how)
+
+
+def diagnosed(folder: Path, case: str, **how: Any) -> dict[str, Any]:
+    profile, run = files(folder, case, **how)
+    return answer("diagnose", run, "--profile", profile)
 
 
 def named(found: dict[str, Any]) -> list[str]:
@@ -55,8 +48,7 @@ def named(found: dict[str, Any]) -> list[str]:
     ],
 )
 def test_what_is_hidden_is_named_and_the_held_out_error_falls(case: str, tmp_path: Path) -> None:
-    profile, run = files(tmp_path, case)
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, case)
     assert found["verdict"] == "explained"
     assert found["geometry"] == "file"
     assert named(found) == list(BY_NAME[case].answers)
@@ -74,8 +66,7 @@ def test_what_is_hidden_is_named_and_the_held_out_error_falls(case: str, tmp_pat
 
 def test_two_effects_on_different_equations_share_what_was_unexplained(tmp_path: Path) -> None:
     """The shares of two effects that act on different equations add up to one."""
-    profile, run = files(tmp_path, "home length, payload")
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, "home length, payload")
     assert found["verdict"] == "explained"
     assert sorted(named(found)) == ["home-length/4", "payload-mass"]
     assert all(step["certain"] for step in found["steps"])
@@ -92,7 +83,7 @@ def test_a_wrong_value_of_the_profile_is_a_step_beside_that_of_the_file(tmp_path
     profile, run = files(tmp_path, "home length")
     table = '\n[[effect]]\nid = "home-length"\nlength = { 4 = "2 mm" }\n'
     profile.write_text(profile_text() + table)
-    found = answered("diagnose", run, "--profile", profile)
+    found = answer("diagnose", run, "--profile", profile)
     assert found["verdict"] == "explained"
     (step,) = found["steps"]
     assert (step["lines"], step["refitted"]) == ({"home-length": ["4"]}, True)
@@ -102,13 +93,12 @@ def test_a_wrong_value_of_the_profile_is_a_step_beside_that_of_the_file(tmp_path
     place = found["outputs"]["platform_position"]
     assert place["heldout_rms_before"] > 3 * place["heldout_rms_after"]
     profile.write_text(profile_text() + table.replace("2 mm", "0.5 mm"))
-    assert answered("diagnose", run, "--profile", profile)["verdict"] == "adequate"
+    assert answer("diagnose", run, "--profile", profile)["verdict"] == "adequate"
 
 
 def test_without_repeats_an_error_beyond_usual_instruments_is_not_adequate(tmp_path: Path) -> None:
     """Waves of 0.3 mm that no effect has: without repeats they are in the estimated noise."""
-    profile, run = files(tmp_path, "outside: waves, no repeats", count=40)
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, "outside: waves, no repeats", count=40)
     assert found["verdict"] in ("undecided", "unknown")
     assert not any(step["certain"] for step in found["steps"])
     place = found["outputs"]["platform_position"]
@@ -119,8 +109,7 @@ def test_without_repeats_an_error_beyond_usual_instruments_is_not_adequate(tmp_p
 
 
 def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
-    profile, run = files(tmp_path, "none")
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, "none")
     assert found["verdict"] == "adequate"
     assert found["steps"] == []
     range_of_runs = {row["effect"]: row["smallest"] for row in found["detectable"]}
@@ -129,8 +118,7 @@ def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
 
 @pytest.mark.campaign  # in .ci/run it is tests/robot/report/test_diagnosis.py's
 def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
-    profile, run = files(tmp_path, "outside: waves")
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, "outside: waves")
     assert found["verdict"] in ("unknown", "partly")
     assert not any(step["certain"] for step in found["steps"])
     assert all(step["doubts"] for step in found["steps"])
@@ -140,8 +128,7 @@ def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
 @pytest.mark.campaign
 def test_a_geometry_that_fits_another_cause_is_never_certain(tmp_path: Path) -> None:
     """A tracker whose metre is 2 mm long: the geometry imitates it, and nothing is certain."""
-    profile, run = files(tmp_path, "outside: tracker's metre")
-    found = answered("diagnose", run, "--profile", profile)
+    found = diagnosed(tmp_path, "outside: tracker's metre")
     assert found["geometry"] == "refitted"
     step = found["steps"][0]
     assert step["whole"]
@@ -153,8 +140,8 @@ def test_calibrate_then_diagnose_names_the_elasticity_that_calibrating_hid(tmp_p
     """The sentence of the plan: the held-out error falls with the effect, geometry refitted."""
     run = record(BY_NAME["elastic ropes"], tmp_path, "poses.csv", count=80, repeats=12)
     calibrated = tmp_path / "calibrated.toml"
-    assert call("calibrate", "cabtive", run, "-o", calibrated).exit_code == 0
-    found = answered("diagnose", run, "--profile", calibrated)
+    assert invoke("calibrate", "cabtive", run, "-o", calibrated).exit_code == 0
+    found = answer("diagnose", run, "--profile", calibrated)
     assert found["verdict"] == "explained"
     assert found["geometry"] == "refitted"
     assert named(found) == ["cable-elongation-linear"]
@@ -170,21 +157,21 @@ def test_calibrate_then_diagnose_names_the_elasticity_that_calibrating_hid(tmp_p
 def test_an_effect_is_added_on_its_line_and_taken_back(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "swivel radius", count=40)
     better, back = tmp_path / "better.toml", tmp_path / "back.toml"
-    before = answered("compare", run, "--profile", profile)["outputs"]["platform_position"]
-    assert call("add", "swivel-radius", "--fit", run, "-p", profile, "-o", better).exit_code == 2
-    added = answered(
+    before = answer("compare", run, "--profile", profile)["outputs"]["platform_position"]
+    assert invoke("add", "swivel-radius", "--fit", run, "-p", profile, "-o", better).exit_code == 2
+    added = answer(
         "add", "swivel-radius", "--winch", "6", "--fit", run, "-p", profile, "-o", better
     )
     value = added["parameters"]["swivel-radius/6"]["radius_error"]
     assert abs(value["value"] - 1.5e-3) < 4 * value["std"]
     table = read_robot(better).effect[0]
     assert (table.id, table.values["line"]) == ("swivel-radius", "6")
-    after = answered("compare", run, "--profile", better)["outputs"]["platform_position"]
+    after = answer("compare", run, "--profile", better)["outputs"]["platform_position"]
     assert after["rms"] < 0.6 * before["rms"]
-    assert call("check", better).exit_code == 0
-    ladder = answered("ledger", "-p", better)["steps"]
+    assert invoke("check", better).exit_code == 0
+    ladder = answer("ledger", "-p", better)["steps"]
     assert ladder[0]["after"]["platform_position"] < ladder[0]["before"]["platform_position"]
-    assert call("undo", "-p", better, "-o", back).exit_code == 0
+    assert invoke("undo", "-p", better, "-o", back).exit_code == 0
     assert read_robot(back).effect == ()
 
 
@@ -193,14 +180,14 @@ def test_effects_are_added_removed_and_taken_back_with_the_others_refitted(tmp_p
     profile, run = files(tmp_path, "elastic, exit point", count=40, repeats=12)
     names = ("rope", "both", "rope-again", "back")
     rope, both, again, back = (tmp_path / f"{name}.toml" for name in names)
-    first = answered("add", "cable-elongation-linear", "--fit", run, "-p", profile, "-o", rope)[
+    first = answer("add", "cable-elongation-linear", "--fit", run, "-p", profile, "-o", rope)[
         "outputs"
     ]["platform_position"]
-    answered("add", "exit-point/3", "--fit", run, "-p", rope, "-o", both)
-    assert call("check", both).exit_code == 0
+    answer("add", "exit-point/3", "--fit", run, "-p", rope, "-o", both)
+    assert invoke("check", both).exit_code == 0
     assert len(read_robot(both).effect) == 3
-    removed = answered("remove", "exit-point/3", "--fit", run, "-p", both, "-o", again)
-    assert call("check", again).exit_code == 0
+    removed = answer("remove", "exit-point/3", "--fit", run, "-p", both, "-o", again)
+    assert invoke("check", again).exit_code == 0
     left = removed["outputs"]["platform_position"]
     assert left["heldout_rms_after"] == pytest.approx(first["heldout_rms_after"], rel=0.05)
     assert left["heldout_rms_after"] > 1.2 * left["heldout_rms_before"]
@@ -208,13 +195,13 @@ def test_effects_are_added_removed_and_taken_back_with_the_others_refitted(tmp_p
     kilonewtons = [float(str(v["axial_stiffness"]).split()[0]) / 1e3 for v in (before, after)]
     assert kilonewtons[1] == pytest.approx(kilonewtons[0], rel=0.02)
     assert len(read_robot(again).effect) == 2
-    steps = answered("ledger", "-p", again)["steps"]
+    steps = answer("ledger", "-p", again)["steps"]
     assert [step["did"] for step in steps] == ["add", "add", "remove"]
     errors = [step["after"]["platform_position"] for step in steps]
     assert errors[1] < errors[0]
     assert errors[1] < errors[2]
-    assert "platform position" in call("ledger", "-p", again).output
-    assert call("undo", "-p", again, "-o", back).exit_code == 0
+    assert "platform position" in invoke("ledger", "-p", again).output
+    assert invoke("undo", "-p", again, "-o", back).exit_code == 0
     assert [table.id for table in read_robot(back).effect] == [
         table.id for table in read_robot(both).effect
     ]
@@ -225,11 +212,11 @@ def test_one_lines_home_length_is_taken_out_of_the_table_of_all(tmp_path: Path) 
     lengths = '[[effect]]\nid = "home-length"\nlength = { 1 = "1 mm", 2 = "2 mm" }\n'
     profile.write_text(profile_text() + "\n" + lengths)
     one, none = tmp_path / "one.toml", tmp_path / "none.toml"
-    assert call("remove", "home-length/2", "-p", profile, "-o", one).exit_code == 0
+    assert invoke("remove", "home-length/2", "-p", profile, "-o", one).exit_code == 0
     assert dict(read_robot(one).effect[0].values["length"]) == {"1": "1 mm"}
-    assert call("remove", "home-length", "--winch", "1", "-p", one, "-o", none).exit_code == 0
+    assert invoke("remove", "home-length", "--winch", "1", "-p", one, "-o", none).exit_code == 0
     assert read_robot(none).effect == ()
-    result = call("remove", "home-length/3", "-p", profile, "-o", tmp_path / "x.toml")
+    result = invoke("remove", "home-length/3", "-p", profile, "-o", tmp_path / "x.toml")
     assert result.exit_code == 3
     assert "home-length/1, home-length/2" in result.output
 
@@ -239,15 +226,16 @@ def test_bad_input_is_reported_with_the_reason(tmp_path: Path) -> None:
     lines = run.read_text().splitlines()
     few = tmp_path / "few.csv"
     few.write_text("\n".join(lines[:6]) + "\n")
-    result = call("diagnose", few, "--profile", profile)
+    result = invoke("diagnose", few, "--profile", profile)
     assert result.exit_code == 3
     assert "at least 10 are needed" in result.output
-    assert call("diagnose", run, "--profile", profile, "--band", "5").exit_code == 2
-    assert call("diagnose", run, "--profile", profile, "--winch", "1").exit_code == 2
-    unknown = call("add", "pulley-coulomb", "--fit", run, "-p", profile, "-o", tmp_path / "x.toml")
+    assert invoke("diagnose", run, "--profile", profile, "--band", "5").exit_code == 2
+    assert invoke("diagnose", run, "--profile", profile, "--winch", "1").exit_code == 2
+    unknown = invoke(
+        "add", "pulley-coulomb", "--fit", run, "-p", profile, "-o", tmp_path / "x.toml"
+    )
     assert unknown.exit_code == 2
     assert "motion" in unknown.output
-    assert isinstance(BY_NAME["none"], Case)
 
 
 @pytest.mark.parametrize("interval", [1.0, 12.0])
@@ -267,6 +255,6 @@ def test_poses_along_a_path_with_a_time_of_each_are_poses(interval: float, tmp_p
     profile.write_text(profile_text())
     lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
     run.write_text("\n".join([",".join(header), *lines]) + "\n")
-    found = answered("compare", run, "--profile", profile)
+    found = answer("compare", run, "--profile", profile)
     assert found["outputs"]["platform_position"]["samples"] == 44 * 3
     assert found["outputs"]["platform_position"]["rms"] < 5e-4

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
+from model_files import answer, invoke
 from robot_poses.cases import CASES
 from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import turn
-from winchkit.cli import main
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of, separation
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.verdict.equivalence import pairs_of
@@ -24,10 +22,6 @@ from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
 
 MOVED = next(case for case in CASES if case.name == "exit point")
-
-
-def call(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def without_tensions(run: Path) -> Path:
@@ -53,9 +47,7 @@ def flat(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def planned(flat: tuple[Path, Path]) -> tuple[dict[str, Any], Path]:
     profile, run = flat
     out = run.with_name("next.csv")
-    result = call("plan", run, "-p", profile, "-o", out, "--json")
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout), out
+    return answer("plan", run, "-p", profile, "-o", out), out
 
 
 def test_points_that_only_turning_distinguishes_are_distinguished_by_turning(
@@ -89,8 +81,7 @@ def test_taking_such_poses_names_one_of_them(flat: tuple[Path, Path], tmp_path: 
     profile, run = flat
     tilt = math.radians(11.0)
     more = record(MOVED, tmp_path, "more.csv", count=12, repeats=0, seed=5, tilt=tilt)
-    result = call("diagnose", run, without_tensions(more), "-p", profile, "--json")
-    found = json.loads(result.stdout)
+    found = answer("diagnose", run, without_tensions(more), "-p", profile)
     assert [step["lines"] for step in found["steps"]] == [{"exit-point": ["3"]}]
     assert found["next_runs"] == []
 
@@ -98,14 +89,14 @@ def test_taking_such_poses_names_one_of_them(flat: tuple[Path, Path], tmp_path: 
 def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     """Pose by pose and in one least-squares problem: the same λ."""
     profile, run = flat
-    answer = diagnose([read_run(run)], read_robot(profile))
-    (pair,) = pairs_of(answer.sets)
-    regression, final = answer.engine.regression, answer.result.final.hypothesis
+    found = diagnose([read_run(run)], read_robot(profile))
+    (pair,) = pairs_of(found.sets)
+    regression, final = found.engine.regression, found.result.final.hypothesis
     whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))
     offers = pose_offers(regression, final, [pair], [SEPARATED_AT], count=3)
     assert offers[0].powers_so_far[0] == pytest.approx(power_of(whole), abs=0.01)
     assert all(len(offer.pose.position) == 3 for offer in offers)
-    (run_offered,) = json.loads(call("diagnose", run, "-p", profile, "--json").stdout)["next_runs"]
+    (run_offered,) = answer("diagnose", run, "-p", profile)["next_runs"]
     assert run_offered["power"] > 0.95
     assert "turned by up to" in run_offered["programme"]
 
@@ -116,7 +107,7 @@ def test_what_no_poses_distinguish_is_said_with_what_does(tmp_path: Path) -> Non
     profile.write_text(profile_text())
     case = next(case for case in CASES if case.name == "drum radius")
     run, out = record(case, tmp_path, "poses.csv", count=30, repeats=12), tmp_path / "next.csv"
-    result = call("plan", run, "-p", profile, "-o", out)
+    result = invoke("plan", run, "-p", profile, "-o", out)
     assert "no such poses distinguish them" in result.stdout
     assert "An encoder on the drum" in " ".join(result.stdout.split())
     assert not out.exists()
@@ -133,6 +124,6 @@ def test_options_without_meaning_for_a_robot_are_refused_with_the_action(
         (("--band", "5"), "no torque"),
         (("--winch", "1"), "leave it out"),
     ):
-        result = call("plan", run, "-p", profile, *option)
+        result = invoke("plan", run, "-p", profile, *option)
         assert result.exit_code == 2
         assert words in result.output

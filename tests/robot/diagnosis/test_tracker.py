@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
+from model_files import answer
 from robot_poses.cases import CASES
 from robot_poses.hidden import profile_text
 from robot_poses.station import Station, about, observed
 from robot_poses.truth import HOME
-from winchkit.cli import main
 from winchkit.schema.read import read_robot
 
 BY_NAME = {case.name: case for case in CASES}
 SMALL = replace(about(0.02), shift=(3e-4, -3e-4, 2e-4))
-
-
-def invoke(*arguments: object) -> str:
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result.stdout
 
 
 def named(found: dict[str, Any]) -> list[set[str]]:
@@ -69,7 +61,7 @@ def test_the_tracker_is_named_and_no_wrong_line(
     case: str, station: Station, expected: list[set[str]], tmp_path: Path
 ) -> None:
     profile, run = files(tmp_path, case, station, angles=False, tension=False)
-    found = json.loads(invoke("diagnose", run, "--profile", profile, "--json"))
+    found = answer("diagnose", run, "--profile", profile)
     assert found["verdict"] == "explained"
     assert sorted(map(sorted, named(found))) == sorted(map(sorted, expected))
     output = found["outputs"]["platform_position"]
@@ -79,7 +71,7 @@ def test_the_tracker_is_named_and_no_wrong_line(
 def test_the_frame_has_its_values_and_angles_of_an_imu_are_recognised(tmp_path: Path) -> None:
     station = Station(30.0, (0.0, 0.0, 1.0), shift=(0.05, -0.1, 0.2), turns_rotation=False)
     profile, run = files(tmp_path, "none", station, tension=False)
-    found = json.loads(invoke("diagnose", run, "--profile", profile, "--json"))
+    found = answer("diagnose", run, "--profile", profile)
     assert named(found) == [{"tracker-frame"}]
     values = found["steps"][0]["parameters"]["tracker-frame"]
     shift = [values[axis]["value"] for axis in "xyz"]
@@ -93,7 +85,7 @@ def test_numbers_that_the_file_has_or_declares_unknown_are_not_missing(tmp_path:
     profile, run = files(tmp_path, "none", station, tension=False)
     unknown = '\n[instrument.tracker]\nframe = "unknown"\nreflector = ["30 mm", "20 mm", "80 mm"]\n'
     profile.write_text(profile_text() + unknown)
-    found = json.loads(invoke("diagnose", run, "--profile", profile, "--json"))
+    found = answer("diagnose", run, "--profile", profile)
     assert (found["verdict"], found["steps"]) == ("adequate", [])
     home = np.array(HOME)
     x, y, z = (home + np.array(station.shift) - station.rotation @ home).tolist()
@@ -101,17 +93,17 @@ def test_numbers_that_the_file_has_or_declares_unknown_are_not_missing(tmp_path:
     frame = f'{{ position = {place}, rotation = ["0 deg", "0 deg", "37 deg"] }}'
     profile.write_text(profile_text() + unknown.replace('"unknown"', frame))
     assert read_robot(profile).instrument.tracker.frame != "unknown"
-    compared = json.loads(invoke("compare", run, "--profile", profile, "--json"))
+    compared = answer("compare", run, "--profile", profile)
     assert compared["outputs"]["platform_position"]["rms"] < 1e-4
-    found = json.loads(invoke("diagnose", run, "--profile", profile, "--json"))
+    found = answer("diagnose", run, "--profile", profile)
     assert (found["verdict"], found["steps"]) == ("adequate", [])
 
 
 def test_the_frame_is_added_to_the_profile(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "none", about(0.2), angles=False, tension=False)
     better = tmp_path / "better.toml"
-    invoke("add", "tracker-frame", "--fit", run, "-p", profile, "-o", better)
+    answer("add", "tracker-frame", "--fit", run, "-p", profile, "-o", better)
     (table,) = read_robot(better).effect
     assert table.id == "tracker-frame"
-    after = json.loads(invoke("compare", run, "--profile", better, "--json"))
+    after = answer("compare", run, "--profile", better)
     assert after["outputs"]["platform_position"]["rms"] < 4e-5

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
+from model_files import answer
 from robot_poses.hidden import BASE, profile_text
 from robot_poses.moving import log
-from winchkit.cli import main
 from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.robot import Pose, rotation_of
@@ -39,10 +36,6 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     log(folder / "drum.csv", truth=replace(BASE, winding=tuple(winding)), count=160)
     log(folder / "late.csv", delay=DELAY, count=60)
     return folder
-
-
-def call(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def test_uniform_motion_and_uniform_acceleration_have_their_derivatives() -> None:
@@ -70,9 +63,7 @@ def test_bands_without_degrees_of_freedom_have_the_variance_of_their_neighbours(
 
 
 def test_a_drum_of_one_winch_is_named_and_the_error_falls(robot: Path) -> None:
-    result = call("diagnose", robot / "drum.csv", "-p", robot / "robot.toml", "--json")
-    assert result.exit_code == 0, result.output
-    found: dict[str, Any] = json.loads(result.stdout)
+    found = answer("diagnose", robot / "drum.csv", "-p", robot / "robot.toml")
     assert (found["verdict"], found["geometry"]) == ("explained", "file")
     (step,) = found["steps"]
     # Layers of one turn: radius and ratio differ by the growth of the layers alone.
@@ -88,16 +79,15 @@ def test_a_drum_of_one_winch_is_named_and_the_error_falls(robot: Path) -> None:
 
 def test_the_delay_of_a_tracker_is_fitted_and_written(robot: Path) -> None:
     run, profile, better = (robot / name for name in ("late.csv", "robot.toml", "better.toml"))
-    result = call("add", "tracker-delay", "--fit", run, "-p", profile, "-o", better, "--json")
-    assert result.exit_code == 0, result.output
-    delay = json.loads(result.stdout)["parameters"]["tracker-delay"]["delay"]
+    added = answer("add", "tracker-delay", "--fit", run, "-p", profile, "-o", better)
+    delay = added["parameters"]["tracker-delay"]["delay"]
     assert abs(delay["value"] - DELAY) < max(4 * delay["std"], 2e-4)
     assert "tracker-delay" in better.read_text()
 
 
 def test_a_declared_delay_is_corrected(robot: Path) -> None:
     before, after = (
-        json.loads(call("compare", robot / "late.csv", "-p", robot / name, "--json").stdout)
+        answer("compare", robot / "late.csv", "-p", robot / name)
         for name in ("robot.toml", "declared.toml")
     )
     rms = [one["outputs"]["platform_position"]["rms"] for one in (before, after)]

@@ -20,7 +20,6 @@ from winchkit.robot.dynamics.dynamics import (
     inverse_dynamics,
     mass_matrix,
     motion_of,
-    sag,
 )
 from winchkit.robot.dynamics.integration import ElasticCables, cable_forces, integrate
 from winchkit.schema.profiles.robot import PlatformSpec
@@ -196,15 +195,6 @@ def test_no_torque_where_no_forces_hold_the_platform() -> None:
     robot = replace(robot, platform=BODY)
     found = inverse_dynamics(robot, np.arange(5.0), motion, ForceLimits(5.0, 200.0))
     assert np.all(np.isnan(found.motor_torque[2]))
-
-
-def test_sag_is_that_of_a_catenary() -> None:
-    span, weight, force = 3.0, 0.02, 40.0
-    parameter = force / (weight * GRAVITY)
-    exact = 2 * parameter * np.sinh(span / (2 * parameter)) - span
-    assert float(sag(np.array(span), np.array(span), np.array(force), weight)) == pytest.approx(
-        exact, rel=1e-4
-    )
 
 
 def test_forward_dynamics_needs_an_inertia() -> None:

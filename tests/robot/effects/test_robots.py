@@ -13,7 +13,7 @@ from winchkit.effects.card import usual_values
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import at_line, placements
 from winchkit.errors import FileError
-from winchkit.robot import robot_of, robot_with_effects, robot_with_terms, rotation_of, wrap_angle
+from winchkit.robot import robot_of, robot_with_effects, robot_with_terms, wrap_angle
 from winchkit.robot.effects.bind import check_robot, robot_terms
 from winchkit.robot.effects.reference import STANDARD_ROBOT, robot_changes, standard_poses
 from winchkit.schema.read import read_robot
@@ -107,16 +107,13 @@ def test_a_payload_moves_tensions_as_its_moment_asks() -> None:
     """A centre moved by δ: the moments of all force changes add up to R δ × m g."""
     robot = robot_of(STANDARD_ROBOT)
     pose = standard_poses()
-    heavier = robot_with_terms(STANDARD_ROBOT, [Term(CATALOGUE["payload-centre"], _shift(0.01))])
+    shifted = Term(CATALOGUE["payload-centre"], {"x": 0.01, "y": 0.0, "z": 0.0})
+    heavier = robot_with_terms(STANDARD_ROBOT, [shifted])
     extra = heavier.weight(pose) - robot.weight(pose)
     down = np.array([0.0, 0.0, -3.0 * 9.80665])
     expected = np.cross(pose.rotation @ np.array([0.01, 0.0, 0.0]), down)
     assert np.allclose(extra[:, :3], 0.0)
     assert np.allclose(extra[:, 3:], expected)
-
-
-def _shift(x: float) -> dict[str, float]:
-    return {"x": x, "y": 0.0, "z": 0.0}
 
 
 def test_a_table_acts_on_its_line_or_on_all(tmp_path: Path) -> None:
@@ -224,4 +221,3 @@ def test_a_robot_that_knows_its_effects_finds_its_platform() -> None:
     }
     assert np.sqrt(np.mean(errors["before"] ** 2)) > 5e-4
     assert errors["after"].max() < 1e-8
-    assert np.allclose(rotation_of(0, 0, 0), np.eye(3))

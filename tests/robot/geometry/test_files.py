@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from scipy.spatial.transform import Rotation
 
+from model_files import invoke
 from robot_cases import shipped
 from winchkit.arrays import Array
-from winchkit.cli import main
 from winchkit.errors import FileError
 from winchkit.robot import ForceLimits, quadratic
 from winchkit.schema.profiles.instruments import FrameSpec
@@ -41,14 +42,23 @@ winch = "bench-spiral"
 
 
 FOUR = HEAD + "".join(line(str(n + 1), *corner) for n, corner in enumerate(CORNERS))
+EIGHT = FOUR + "".join(
+    line(str(n + 5), 0.9 * x, 1.1 * y, side=-0.1) for n, (x, y) in enumerate(CORNERS)
+)
+INSIDE = (
+    FOUR.replace('"3 m"]', '"1.1 m"]', 1)
+    .replace('["2 m", "2 m"', '["0.195 m", "0.2 m"')
+    .replace("winch", 'swivel_radius = "20 mm"\nwinch', 1)
+)
+Check = Callable[[str], Result]
 
 
 @pytest.fixture
-def check(tmp_path: Path) -> object:
+def check(tmp_path: Path) -> Check:
     def run(text: str) -> Result:
         file = tmp_path / "robot.toml"
         file.write_text(text)
-        return CliRunner().invoke(main, ["check", str(file)])
+        return invoke("check", file)
 
     return run
 
@@ -57,7 +67,7 @@ def check(tmp_path: Path) -> object:
 def test_check_accepts_the_papers_robots_and_their_winches(name: str) -> None:
     folder = Path(__file__).parents[3] / "profiles"
     winch = {"winding-device-8": "winding-device"}.get(name, name) + "-winch.toml"
-    result = CliRunner().invoke(main, ["check", str(folder / f"{name}.toml"), str(folder / winch)])
+    result = invoke("check", folder / f"{name}.toml", folder / winch)
     assert result.exit_code == 0, result.stderr
     assert f"ok (robot '{name}')" in result.stdout
     assert result.stderr == ""
@@ -95,9 +105,9 @@ def test_the_winding_devices_robot_hangs_on_eight_cables() -> None:
     assert robot.profile.platform.mass * 9.80665 == pytest.approx(1000, abs=0.1)
 
 
-def test_a_robot_of_ones_own_is_a_file(check: object) -> None:
-    """Four cables: the platform hangs."""
-    result = check(FOUR)
+@pytest.mark.parametrize("text", [FOUR, EIGHT], ids=["hanging", "held"])
+def test_a_robot_of_ones_own_is_a_file(check: Check, text: str) -> None:
+    result = check(text)
     assert result.exit_code == 0, result.stderr
     assert result.stderr == ""
 
@@ -130,26 +140,37 @@ def test_an_exit_point_that_is_anothers_is_reported_on_its_own_line(tmp_path: Pa
     assert caught.value.faults[0].line == len(text.splitlines()) - 2
 
 
-def test_home_where_cables_would_have_to_push(check: object) -> None:
-    eight = FOUR + "".join(
-        line(str(n + 5), 0.9 * x, 1.1 * y, side=-0.1) for n, (x, y) in enumerate(CORNERS)
-    )
-    assert check(eight).exit_code == 0
-    result = check(eight.replace('"1 m"]', '"4 m"]'))
-    assert result.exit_code == 3
-    assert "robot.toml:6: home: no pulling cables hold the platform of 10 kg there" in result.stderr
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        (
+            EIGHT.replace('"1 m"]', '"4 m"]'),
+            3,
+            "robot.toml:6: home: no pulling cables hold the platform of 10 kg there",
+        ),
+        (INSIDE, 3, "the anchor of line 1 lies inside its swivel pulley (swivel_radius 20 mm)"),
+        (
+            FOUR.replace("10 kg", "0 kg"),
+            3,
+            "4 lines leave the platform free, only its weight settles its pose; give mass",
+        ),
+        (
+            EIGHT.replace("10 kg", "0 kg"),
+            0,
+            "without mass nothing keeps the cables taut; give mass (warning)",
+        ),
+    ],
+    ids=["cables would push", "anchor inside a pulley", "hanging without mass", "held without"],
+)
+def test_a_robot_that_cannot_hold_its_platform(
+    check: Check, text: str, code: int, words: str
+) -> None:
+    result = check(text)
+    assert result.exit_code == code
+    assert words in result.stderr
 
 
-def test_an_anchor_inside_its_pulley(check: object) -> None:
-    text = FOUR.replace('"3 m"]', '"1.1 m"]', 1).replace('["2 m", "2 m"', '["0.195 m", "0.2 m"')
-    result = check(text.replace("winch", 'swivel_radius = "20 mm"\nwinch', 1))
-    assert result.exit_code == 3
-    assert "the anchor of line 1 lies inside its swivel pulley (swivel_radius 20 mm)" in (
-        result.stderr
-    )
-
-
-def test_a_hanging_platform_that_would_not_rest_at_home(check: object) -> None:
+def test_a_hanging_platform_that_would_not_rest_at_home(check: Check) -> None:
     """A warning with the place at which it would: taken over, it is gone."""
     text = FOUR.replace('position = ["0 m", "0 m", "1 m"]', 'position = ["0.1 m", "0.1 m", "1 m"]')
     result = check(text)
@@ -208,35 +229,18 @@ def test_a_frame_through_measured_points_and_a_home_pose_as_the_tracker_showed_i
         ('frame = "unknown"', "home.frame: needs the frame and the reflector"),
     ],
 )
-def test_points_that_give_no_frame(check: object, table: str, words: str) -> None:
+def test_points_that_give_no_frame(check: Check, table: str, words: str) -> None:
     text = FOUR.replace("[home]", '[home]\nframe = "tracker"')
-    result = check(f"{text}\n[instrument.tracker]\n{table}\n")  # type: ignore[operator]
+    result = check(f"{text}\n[instrument.tracker]\n{table}\n")
     assert result.exit_code == 3
     assert words in result.stderr
 
 
-def test_a_hanging_platform_without_mass(check: object) -> None:
-    result = check(FOUR.replace('mass = "10 kg"', 'mass = "0 kg"'))
-    assert result.exit_code == 3
-    assert "4 lines leave the platform free, only its weight settles its pose; give mass" in (
-        result.stderr
-    )
-
-
-def test_without_mass_nothing_keeps_the_cables_of_a_suspended_robot_taut(check: object) -> None:
-    eight = FOUR + "".join(
-        line(str(n + 5), 0.9 * x, 1.1 * y, side=-0.1) for n, (x, y) in enumerate(CORNERS)
-    )
-    result = check(eight.replace('mass = "10 kg"', 'mass = "0 kg"'))
-    assert result.exit_code == 0
-    assert "without mass nothing keeps the cables taut; give mass (warning)" in result.stderr
-
-
 @pytest.mark.parametrize(("third", "code"), [("0.7 kg m^2", 0), ("0.8 kg m^2", 3)])
 def test_no_body_has_a_moment_above_the_sum_of_the_others(
-    check: object, third: str, code: int
+    check: Check, third: str, code: int
 ) -> None:
     moments = f'inertia = ["0.3 kg m^2", "0.4 kg m^2", "{third}"]\n'
-    result = check(FOUR.replace("[home]", f"{moments}[home]"))  # type: ignore[operator]
+    result = check(FOUR.replace("[home]", f"{moments}[home]"))
     assert result.exit_code == code, result.stderr
     assert ("above the sum" in result.stderr) == (code == 3)

@@ -23,26 +23,27 @@ def call(*arguments: object) -> Result:
     return result
 
 
+def diagnosed(folder: Path, fault: str, *options: str, count: int, repeats: int) -> dict[str, Any]:
+    """What ``winchkit diagnose`` writes of a robot with a hidden fault."""
+    profile, page = folder / "robot.toml", folder / "out.html"
+    profile.write_text(profile_text())
+    run = record(BY_NAME[fault], folder, "poses.csv", count=count, repeats=repeats)
+    text = call("diagnose", run, "--profile", profile, "--html", page, *options).stdout
+    return {"text": text, "html": page.read_text(), "run": run, "robot": profile}
+
+
 @pytest.fixture(scope="module")
 def drum(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A drum radius hidden on line 2: its page and its JSON."""
     folder = tmp_path_factory.mktemp("drum")
-    profile, page = folder / "robot.toml", folder / "out.html"
-    profile.write_text(profile_text())
-    run = record(BY_NAME["drum radius"], folder, "poses.csv", count=40, repeats=12)
-    printed = call("diagnose", run, "--profile", profile, "--json", "--html", page).stdout
-    return {"answer": json.loads(printed), "html": page.read_text(), "run": run, "robot": profile}
+    found = diagnosed(folder, "drum radius", "--json", count=40, repeats=12)
+    return found | {"answer": json.loads(found["text"])}
 
 
 @pytest.fixture(scope="module")
 def unknown(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Waves along x that no effect has."""
-    folder = tmp_path_factory.mktemp("waves")
-    profile, page = folder / "robot.toml", folder / "out.html"
-    profile.write_text(profile_text())
-    run = record(BY_NAME["outside: waves"], folder, "poses.csv", count=50, repeats=15)
-    text = call("diagnose", run, "--profile", profile, "--html", page).stdout
-    return {"text": text, "html": page.read_text()}
+    return diagnosed(tmp_path_factory.mktemp("waves"), "outside: waves", count=50, repeats=15)
 
 
 def test_the_page_is_whole_without_script_and_network(drum: dict[str, Any]) -> None:

@@ -79,10 +79,7 @@ def tares_toml(book: TareBook) -> str:
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """Write a file atomically; raises FileError.
-
-    ``path``: file, replaced atomically. Raises FileError where the file cannot be written.
-    """
+    """Write a file atomically; raises FileError."""
     target = Path(path)
     write_whole(target, text.encode())
     return target

@@ -15,7 +15,7 @@ section 3.2). Figures of merit follow ISO 376 and OIML R 60, as shares of the sp
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -148,11 +148,8 @@ def _refuse_slope(slope: float, std: float) -> None:
 
 def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array, float]:
     """Coefficients with covariance, residuals (true less fitted) and their standard deviation.
-
     Raises RunError for a parabola that turns round within the loads.
 
-    Notes
-    -----
     Gauss-Newton on the readings: minimises Σ (x − g(y))², with g the inverse of the polynomial,
     from the regression of y on x; covariance s² (JᵀJ)⁻¹, ∂g/∂cₖ = −gᵏ/p'(g).
     """
@@ -257,24 +254,22 @@ def _warnings(
     residuals: Array,
     std: float,
     slope: float,
-) -> list[str]:
+) -> Iterator[str]:
     """Warnings on missing loads, directions, series, and on outlying points."""
-    found = []
     if len(groups) < _FEWEST_LOADS:
-        found.append(f"only {len(groups)} loads; at least {_FEWEST_LOADS} are usual")
+        yield f"only {len(groups)} loads; at least {_FEWEST_LOADS} are usual"
     if {point.going for point in points} != {"up", "down"}:
-        found.append("loads go one way only, so hysteresis is unknown")
+        yield "loads go one way only, so hysteresis is unknown"
     elif not any(points[k].going == "down" for k in groups[0]):
-        found.append(
+        yield (
             "no reading at the smallest load after the largest: a moved zero counts as hysteresis"
         )
     if max(point.series for point in points) == 1:
-        found.append("one series only, so repeatability is unknown")
-    found += [
+        yield "one series only, so repeatability is unknown"
+    yield from (
         f"the point at {point.load:g} N is {residual:+.3g} N off"
         for point, residual in zip(points, residuals, strict=True)
         if abs(residual) > _FAR * std > 0
-    ]
+    )
     if slope * max(point.std for point in points) > std > 0:
-        found.append("the readings have more noise than the points: wait longer after each load")
-    return found
+        yield "the readings have more noise than the points: wait longer after each load"

@@ -7,7 +7,7 @@ readings are not interpolated.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,10 +118,8 @@ class Health:
 
 
 def examine(samples: CellSamples) -> Health:
-    """Health of a load cell.
-
-    ``samples``: a few seconds of readings. Raises RunError for fewer than 20 usable readings.
-    """
+    """Health of a load cell by a few seconds of readings; raises RunError for fewer than 20 usable
+    ones."""
     good = samples.usable & np.isfinite(samples.value)
     if int(good.sum()) < _FEWEST:
         raise RunError(
@@ -258,19 +256,18 @@ def is_wrong(health: Health) -> bool:
     return bool(lost or health.unique == 1 or _is_stuck(health))
 
 
-def lost_readings(health: Health) -> list[str]:
+def lost_readings(health: Health) -> Iterator[str]:
     """Remarks on readings that are saturated or not usable for another reason."""
-    remarks, lost = [], health.readings - health.usable - health.saturated
+    lost = health.readings - health.usable - health.saturated
     if health.saturated:
-        remarks.append(f"{health.saturated} readings are saturated: overload or a broken wire")
+        yield f"{health.saturated} readings are saturated: overload or a broken wire"
     if lost > 0:
-        remarks.append(f"{lost} readings are unusable")
-    return remarks
+        yield f"{lost} readings are unusable"
 
 
 def _with_remarks(health: Health, duration: float) -> Health:
     """The figures with remarks, worst first."""
-    remarks = lost_readings(health)
+    remarks = list(lost_readings(health))
     if health.unique == 1:
         remarks.append("the counts never change: a frozen cell, or a division far above its noise")
     elif health.noise_counts < 0.5:
@@ -314,10 +311,7 @@ def _alias(frequency: float, rate: float) -> str:
 
 
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> CellSamples:
-    """Samples from rows of time, raw counts, value, usable, saturated.
-
-    ``rows`` (n, 5): time, s, raw counts, value, usable, saturated.
-    """
+    """Samples from rows (n, 5): time, s, raw counts, value, usable, saturated."""
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return CellSamples(
         time.astype(float),

@@ -1,5 +1,4 @@
 """``winchkit library`` and ``winchkit fleet``: runs of many winches in a folder.
 
-``index``, ``list`` and ``query`` are commands on the tables of the runs; ``diagnose`` fills those
-of the diagnoses.
+``diagnose`` fills the tables that ``list`` and ``query`` read.
 """

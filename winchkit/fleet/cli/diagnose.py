@@ -6,28 +6,21 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.core.command import Example, ToolCommand
+from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import own_effects_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
+from winchkit.fleet.cli.fleet import DIAGNOSE_EXAMPLES, profile_option
 
 
 @click.command(
     "diagnose",
     cls=ToolCommand,
-    examples=(
-        Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example(
-            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
-            "needs a Dask scheduler",
-        ),
-    ),
+    examples=DIAGNOSE_EXAMPLES,
 )
 @click.argument("folder", metavar="DIR")
-@click.option(
-    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
-)
+@profile_option
 @own_effects_option()
 @click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz.")
 @click.option(

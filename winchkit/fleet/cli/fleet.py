@@ -12,17 +12,22 @@ COMMANDS = {
     "trend": CommandPlace("winchkit.fleet.cli.trend", "What changed, since when, at what cost."),
 }
 
+DIAGNOSE_EXAMPLES = (
+    Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
+    Example(
+        "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
+        "needs a Dask scheduler",
+    ),
+)
+profile_option = click.option(
+    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
+)
+
 
 @click.group(
     cls=LazyGroup,
     table=COMMANDS,
-    examples=(
-        Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example(
-            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
-            "needs a Dask scheduler",
-        ),
-    ),
+    examples=DIAGNOSE_EXAMPLES,
 )
 def command() -> None:
     """Many winches and sessions: the runs of an indexed folder."""

@@ -14,6 +14,7 @@ from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import html_option, write_page
 from winchkit.errors import UsageError, suggest
+from winchkit.fleet.cli.fleet import profile_option
 
 
 @click.command(
@@ -29,9 +30,7 @@ from winchkit.errors import UsageError, suggest
     ),
 )
 @click.argument("folder", metavar="DIR")
-@click.option(
-    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
-)
+@profile_option
 @click.option(
     "--effect",
     "effects",

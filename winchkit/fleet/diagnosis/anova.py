@@ -117,10 +117,8 @@ def errors_of(compared: WinchCompared) -> dict[str, WinchErrors]:
 
 
 def shared_errors(winches: Mapping[str, Mapping[str, WinchErrors]]) -> dict[str, SharedError]:
-    """Per output the common and the individual part of the errors of several winches.
-
-    ``winches``: name to the errors of :func:`errors_of`.
-    """
+    """Per output the common and the individual part of the errors of several winches
+    (:func:`errors_of`)."""
     outputs = dict.fromkeys(output for errors in winches.values() for output in errors)
     out = {}
     for output in outputs:

@@ -93,11 +93,8 @@ class Change:
 
 
 def session_variance(series: Sequence[ParameterSeries]) -> Variance:
-    """Variance τ² of the session effect, from successive differences of all series.
-
-    A step appears in one difference and a trend in each by a little; the estimate is the robust
-    one of :func:`robust_variance`, so that winches that changed do not hide their change.
-    """
+    """Variance τ² of the session effect, from successive differences of all series: a step appears
+    in one and a trend in each by a little, so that the robust estimate does not hide changes."""
     differences = [np.diff(s.values) for s in series]
     variances = [s.stds[1:] ** 2 + s.stds[:-1] ** 2 for s in series]
     if not differences:
@@ -107,14 +104,10 @@ def session_variance(series: Sequence[ParameterSeries]) -> Variance:
 
 
 def change_of(series: ParameterSeries, between: Variance) -> Change | None:
-    """Largest change of a series; None with fewer than four sessions.
-
-    Notes
-    -----
-    Every step and the trend is a contrast with z ~ t(ν) under no change, ν the degrees of freedom
-    of τ². The p-value is n P(abs t > max abs z) for n − 1 dates and one trend (Bonferroni), valid
-    whatever the dependence of these tests.
-    """
+    """Largest change of a series; None with fewer than four sessions. Every step and the trend is a
+    contrast with z ~ t(ν) under no change, ν the degrees of freedom of τ²; the p-value is n P(abs t
+    > max abs z) for n − 1 dates and one trend (Bonferroni), valid whatever the dependence of these
+    tests."""
     n = len(series.times)
     if n < LEAST_SESSIONS:
         return None
@@ -150,12 +143,9 @@ def change_of(series: ParameterSeries, between: Variance) -> Change | None:
 
 
 def step_date(series: ParameterSeries, between: Variance) -> StepDate:
-    """Posterior of the date of a step whose level and height are unknown.
-
-    Uniform prior over time, flat priors of level and height: the probability of the interval
-    between two sessions is proportional to its length times det(XᵀWX)^(−1/2) exp(−χ²/2), with χ²
-    the weighted residual sum of squares of the best step there (Smith 1975).
-    """
+    """Posterior of the date of a step whose level and height are unknown. With flat priors the
+    probability of the interval between two sessions is proportional to its length times
+    det(XᵀWX)^(−1/2) exp(−χ²/2), with χ² of the best step there (Smith 1975)."""
     sigma = np.sqrt(series.stds**2 + between.value)
     logs = []
     for shape, length in zip(_steps(len(sigma)), np.diff(series.times), strict=True):

@@ -95,10 +95,8 @@ def _oldest_answer(running: deque[tuple[str, Future[WinchAnswer]]]) -> tuple[str
 
 
 def _started(work: Callable[[str], WinchAnswer], name: str) -> Future[WinchAnswer]:
-    """Start the computation of an answer in a thread.
-
-    A thread pool would wait for its threads, for seconds, when the caller is interrupted.
-    """
+    """Start the computation of an answer in a thread; a pool would wait for its threads, for
+    seconds, when the caller is interrupted."""
     future: Future[WinchAnswer] = Future()
 
     def run() -> None:

@@ -136,14 +136,9 @@ class FleetParameter:
     winches: tuple[WinchHistory, ...]
 
     def deviations(self, winch: WinchHistory) -> Array:
-        """Deviation of each session of a winch from the median winch, in standard deviations.
-
-        Notes
-        -----
-        (y − m) / √(s² + τ²) with m the median of the winches' present values, which one odd winch
-        does not move, s² the variance of the estimate and τ² that of the sessions. The spread
-        between winches is not part of it, so that a winch that differs is seen.
-        """
+        """Deviation of each session of a winch from the median winch, (y − m) / √(s² + τ²), s² the
+        variance of the estimate and τ² that of the sessions. One odd winch does not move the median
+        m, and the spread between winches is no part of it, so that a winch that differs is seen."""
         median = float(np.median([own.value for own in self.winches]))
         series = winch.series
         sigma = np.sqrt(series.stds**2 + self.session_std**2)
@@ -194,17 +189,13 @@ class FleetHistory:
 def fleet_history(
     estimates: Iterable[SessionEstimate], limits: Mapping[Key, float] | None = None
 ) -> FleetHistory:
-    """Changes over time and differences between winches of a fleet.
+    """Changes over time and differences between winches of a fleet, by estimates of one fixed set
+    of effects; ``limits`` are values that must not be reached, SI, not zero.
 
-    ``estimates``: of one fixed set of effects, any order. ``limits``: (effect, parameter) to the
-    value that must not be reached, SI, not zero.
-
-    Notes
-    -----
     Adjusted p-values are those of Benjamini and Hochberg where every fit has one parameter, since
     the tests of different winches are nearly independent; otherwise those of Benjamini and
-    Yekutieli, which hold under any dependence of the parameters of one fit. Changes and odd winches
-    are two families of tests. Dates are part of the p-value of a change (Bonferroni).
+    Yekutieli, which hold under any dependence. Changes, their dates included (Bonferroni), and odd
+    winches are two families of tests.
     """
     known = list(estimates)
     used = [e for e in known if np.isfinite(e.value) and e.std > 0.0]

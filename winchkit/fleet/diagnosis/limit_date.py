@@ -30,16 +30,13 @@ class LimitDate:
 
 
 def limit_date(series: ParameterSeries, between: Variance, limit: float) -> LimitDate | None:
-    """Date at which the trend of a series reaches a limit; None where its rate leaves none.
+    """Date at which the trend of a series reaches a limit, SI, not zero; None where its rate leaves
+    none.
 
-    ``limit``: value of the parameter, SI, not zero.
-
-    Notes
-    -----
-    With the line a + b (t − t̄) the 95 % set of dates is that of all t at which
-    (a + b (t − t̄) − limit)² ≤ q² Var(a + b (t − t̄)): an interval where b differs from zero at
-    5 %, otherwise unbounded, which is no date. A line towards zero reaches no limit. q is the
-    quantile of t with the degrees of freedom of τ².
+    With the line a + b (t − t̄) the 95 % set of dates is that of all t at which (a + b (t − t̄) −
+    limit)² ≤ q² Var(a + b (t − t̄)): an interval where b differs from zero at 5 %, otherwise
+    unbounded, which is no date. A line towards zero reaches no limit. q is the quantile of t with
+    the degrees of freedom of τ².
     """
     weight = 1 / (series.stds**2 + between.value)
     centre = float(np.average(series.times, weights=weight))

@@ -115,11 +115,9 @@ def shared_effects(
 
 
 def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict[str, float]:
-    """Probability that noise alone makes at least one of all winches alarm (Šidák).
-
-    ``chances``: P-value of lack of fit per winch; NaN without repeats. Returns: 1 − (1 − p)^winches
-    of each winch with an alarm and without a step.
-    """
+    """Probability 1 − (1 − p)^winches that noise alone makes at least one of all winches alarm
+    (Šidák), of each winch with an alarm and without a step; p of lack of fit, NaN without
+    repeats."""
     return {
         winch: 1 - (1 - min(chances[winch], 1.0)) ** len(found)
         for winch, one in found.items()
@@ -128,10 +126,8 @@ def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict
 
 
 def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: bool) -> Pooled:
-    """Mean over winches with homogeneity test and outlying winches.
-
-    ``reciprocal``: whether 1/value is pooled, in which the uncertainty is symmetric.
-    """
+    """Mean over winches with homogeneity test and outlying winches; of 1/value where it is
+    ``reciprocal``, in which the uncertainty is symmetric."""
     names = list(values)
     x, s = np.array(list(values.values())).T
     if reciprocal:

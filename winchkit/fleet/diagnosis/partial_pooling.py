@@ -51,15 +51,9 @@ class PartialPooling:
 def partial_pooling(values: Array, stds: Array) -> PartialPooling:
     """Estimate the common value, the variance between winches and the pooled values.
 
-    ``values``: own estimate of every winch, shape (n,). ``stds``: their standard deviations, shape
-    (n,), positive.
-
-    Notes
-    -----
-    REML: minimum over τ² of Σ ln(v + τ²) + ln Σ 1/(v + τ²) + Σ (y − μ)²/(v + τ²). With equal
-    variances v it is the larger of zero and S² − v, S² the sample variance. The mean squared error
-    of a pooled value is g₁ + g₂ + 2 g₃ (Prasad and Rao): of known μ and τ², of μ, and of τ², whose
-    REML estimate has the variance 2/Σ 1/(v + τ²)²; it is at most that of the own estimate.
+    REML: minimum over τ² of Σ ln(v + τ²) + ln Σ 1/(v + τ²) + Σ (y − μ)²/(v + τ²). The mean squared
+    error of a pooled value is g₁ + g₂ + 2 g₃ (Prasad and Rao): of known μ and τ², of μ, and of τ²,
+    whose REML estimate has the variance 2/Σ 1/(v + τ²)²; it is at most that of the own estimate.
     """
     own = stds**2
     between, common, variance = _common(values, own)
@@ -80,17 +74,11 @@ def partial_pooling(values: Array, stds: Array) -> PartialPooling:
 def odd_p_values(values: Array, stds: Array) -> Array:
     """P-value of every winch of being one of the others, shape (n,); NaN with fewer than four.
 
-    ``values``: own estimate of every winch, shape (n,). ``stds``: their standard deviations, shape
-    (n,), positive.
-
-    Notes
-    -----
     The winch farthest from the common value in its standard deviations is left out, then the
     farthest of those that remain, for k = n // 4 winches. The difference of each from the common
-    value of the m that remain, over its standard deviation with their τ², is t distributed with
-    m − 1 degrees of freedom. Its p-value is the smallest of its own and those of the winches left
-    out later (Rosner 1983), times k (Bonferroni). Winches that are never left out have the p-value
-    1.
+    value of the m that remain, over its standard deviation with their τ², is t distributed with m −
+    1 degrees of freedom. Its p-value is the smallest of its own and those of the winches left out
+    later (Rosner 1983), times k (Bonferroni); that of the others is 1.
     """
     n = len(values)
     if n < LEAST_WINCHES:

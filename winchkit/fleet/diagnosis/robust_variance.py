@@ -33,13 +33,9 @@ class Variance:
 
 
 def robust_variance(deviations: Array, known: Array) -> Variance:
-    """Variance τ² of a common source besides known variances.
-
-    ``deviations``: values of mean zero, shape (n,). ``known``: their known variances, shape (n,).
-    Returns: τ² at which the median of d²/(v + τ²) is that of χ²(1), 0.455; zero where it is below
-    without τ². Degrees of freedom: 0.367 n, the asymptotic efficiency of the median absolute
-    deviation.
-    """
+    """Variance τ² of a common source besides known variances v of deviations d, (n,): that at which
+    the median of d²/(v + τ²) is that of χ²(1), 0.455; zero where it is below without τ². It has
+    0.367 n degrees of freedom, the asymptotic efficiency of the median absolute deviation."""
     squares, dof = deviations**2, max(_EFFICIENCY * len(deviations), 1.0)
     high = 2 * float(np.median(squares)) / _MEDIAN_OF_CHI_SQUARE if len(squares) else 0.0
 

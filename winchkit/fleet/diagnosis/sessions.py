@@ -9,7 +9,7 @@ zero, which estimates over time and over winches require.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import cos, log, sin
@@ -63,12 +63,8 @@ def null_term(effect: Effect) -> Term:
 
 
 def common_terms(found: Mapping[str, Diagnosis], catalogue: Catalogue) -> tuple[Term, ...]:
-    """Effects named in any diagnosis of a fleet, each equivalence set by one member.
-
-    ``found``: any name (of a winch, of a session) to its diagnosis. Returns: the effect that most
-    diagnoses allow, for every set of :func:`shared_effects`, at its null; orders as they were
-    found.
-    """
+    """Effects named in any diagnosis of a fleet, at their null: of every set of
+    :func:`shared_effects` the one that most diagnoses allow; orders as they were found."""
     out: dict[str, Term] = {}
     for shared in shared_effects(found, catalogue):
         effect = catalogue[shared.effects[0]]
@@ -91,19 +87,13 @@ def fit_session(
     time: float,
     catalogue: Catalogue | None = None,
 ) -> tuple[SessionEstimate, ...]:
-    """Fit a given set of effects, and those of the profile, to the runs of one session.
+    """Fit a given set of effects, and those of the profile at its values, to the runs of one
+    session, ``time`` s since 1970 (UTC). Raises RunError with every fault of every run.
 
-    ``terms``: effects at their starting values, the same for all sessions. An effect that the
-    profile has starts at the profile's values. ``time``: start of the session, s since 1970 (UTC).
-    ``catalogue``: by default all that are installed. Returns: every fitted parameter of ``terms``,
-    with the covariance of the linearised fit; of an effect of the profile the whole value, not its
-    difference from the profile. Raises RunError with every fault of every run.
-
-    Notes
-    -----
     The standard deviation is that of the noise within the session. Errors of the model that recur
-    in every session do not vary over time and are left out; what varies from session to session
-    besides the noise is estimated from the sessions (:mod:`winchkit.fleet.diagnosis.changes`).
+    in every session do not vary over time and are left out; what varies besides the noise is
+    estimated from the sessions (:mod:`winchkit.fleet.diagnosis.changes`). Of an effect of the
+    profile the result is the whole value, not its difference from the profile.
     """
     catalogue = catalogue or load_catalogue()
     dataset = prepare(runs, profile, None, decimate=True, fast=True, catalogue=catalogue)
@@ -152,15 +142,14 @@ class _Linear:
     """Derivative of the value by the coordinate."""
 
 
-def _linear(term: Term, vector: Array) -> list[_Linear]:
-    coordinates, out = Coordinates(term.effect), []
+def _linear(term: Term, vector: Array) -> Iterator[_Linear]:
+    coordinates = Coordinates(term.effect)
     for index, name in enumerate(coordinates.names):
         label, unit, of = _transform(term.effect, term.effect.parameter(name))
         moved = vector.copy()
         moved[index] += _STEP
         value, beside = (of(coordinates.values(x, term.values)) for x in (vector, moved))
-        out.append(_Linear(term.label, label, unit, value, (beside - value) / _STEP))
-    return out
+        yield _Linear(term.label, label, unit, value, (beside - value) / _STEP)
 
 
 def _transform(

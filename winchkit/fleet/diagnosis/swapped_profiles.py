@@ -51,24 +51,18 @@ def swapped_profiles(
     profiles: Mapping[str, Array],
     dof: float = inf,
 ) -> tuple[Swap, ...]:
-    """Cycles of winches whose profiles were exchanged, significant at 1 %.
+    """Cycles of winches whose profiles were exchanged, significant at 1 %, by identified parameters
+    x with their covariances C and ``dof``, and declared ones p.
 
-    ``identified``: winch to its identified parameters, shape (p,): the declared values plus fitted
-    errors. ``covariances``: winch to their covariance, shape (p, p). ``profiles``: winch to the
-    parameters of its declared profile, shape (p,). ``dof``: degrees of freedom of the covariances;
-    infinite for known ones.
-
-    Notes
-    -----
     The assignment minimises Σ (x − p)ᵀ C⁻¹ (x − p) + 2 m ln n, with m the number of the n winches
     that get another profile: the penalty of a search among n alternatives per winch (Foster and
     George 1994). Without it winches whose profiles differ by less than C are exchanged by chance,
     and join the cycles of those that were exchanged. For a cycle, the decrease D of the first sum
     against the declared profiles is N(−d², 4 d²) if these are right, d² the sum of the squared
-    distances δᵀ C⁻¹ δ between each declared profile and the assigned one:
-    p = Φ(−(D + d²)/(2 d)), with the distribution function of t for estimated covariances. Every
-    winch of a cycle must fit its new profile: one whose profile is mistyped fits that of another
-    winch, which does not fit the mistyped one.
+    distances δᵀ C⁻¹ δ between each declared profile and the assigned one: p = Φ(−(D + d²)/(2 d)),
+    with the distribution function of t for estimated covariances. Every winch of a cycle must fit
+    its new profile: one whose profile is mistyped fits that of another winch, which does not fit
+    the mistyped one.
     """
     names = list(identified)
     inverses = [np.asarray(np.linalg.inv(covariances[n]), dtype=np.float64) for n in names]
@@ -109,14 +103,10 @@ def swapped_by_radius(
     profiles: Mapping[str, WinchProfile],
     catalogue: Catalogue,
 ) -> tuple[Swap, ...]:
-    """Exchanged profiles by the cable length per motor angle, r/i on the first layer.
-
-    Notes
-    -----
-    What all winches have in common, the median difference from the declared value, is no evidence.
-    The scatter of the differences beyond their standard deviations is estimated from all winches
-    by :func:`robust_variance`; fewer than half of them may be exchanged.
-    """
+    """Exchanged profiles by the cable length per motor angle, r/i on the first layer. The median
+    difference from the declared value, which all have in common, is no evidence; the scatter beyond
+    their standard deviations is that of :func:`robust_variance`. Fewer than half may be
+    exchanged."""
     found = [p for p in parameters if p.effect in (_RADIUS, _RATIO)]
     if len(found) != 1 or len(found[0].winches) < LEAST_WINCHES:
         return ()

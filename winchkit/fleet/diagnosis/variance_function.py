@@ -32,11 +32,8 @@ _PRIOR_STD = 0.5
 
 
 def power_of_stated(values: Sequence[Array], stds: Sequence[Array]) -> float:
-    """Power λ, 0 to 1, of the stated standard deviations in the true ones.
-
-    ``values``: estimates of every winch in the order of time, (n,) each, SI. Returns: posterior
-    mean under λ ~ N(1, 0.5²), within its bounds.
-    """
+    """Power λ, 0 to 1, of the stated standard deviations in the true ones: posterior mean under λ ~
+    N(1, 0.5²), within its bounds, by estimates (n,) of every winch in the order of time."""
     cross, squares = 0.0, 0.0
     for own, stated in zip(values, stds, strict=True):
         difference = np.diff(own)
@@ -55,9 +52,7 @@ def power_of_stated(values: Sequence[Array], stds: Sequence[Array]) -> float:
 
 
 def moderated_stds(stds: Array, power: float) -> Array:
-    """Standard deviations of one winch in proportion to a power of the stated ones.
-
-    ``stds``: stated values, (n,). ``power``: λ. Returns (n,): with the same mean variance.
-    """
+    """Standard deviations of one winch, (n,), in proportion to a power of the stated ones, with the
+    same mean variance."""
     relative = (stds / np.exp(np.mean(np.log(stds)))) ** (2 * power)
     return np.asarray(np.sqrt(relative * np.mean(stds**2) / np.mean(relative)))

@@ -36,13 +36,10 @@ def cluster_outcomes(
     scheduler: str | None = None,
     work: Callable[[Task], Outcome] = outcome_of,
 ) -> Iterator[Outcome]:
-    """Outcomes of tasks as they end, in any order.
-
-    ``jobs``: processes of this computer, by default by its cores and memory. ``scheduler``: address
-    of an existing scheduler, such as ``tcp://host:8786``. Raises UsageError without Dask; for
+    """Outcomes of tasks as they end, in any order, by ``jobs`` processes of this computer or an
+    existing ``scheduler``, such as ``tcp://host:8786``. Raises UsageError without Dask, and for
     workers with another version of winchkit; ConnectionLost for a scheduler that does not answer,
-    or has no workers any more.
-    """
+    or has no workers any more."""
     try:
         dask: Any = import_module("dask")
         distributed: Any = import_module("distributed")
@@ -84,9 +81,8 @@ def cluster_outcomes(
 
 @contextmanager
 def _without_sigint() -> Iterator[None]:
-    """Processes and threads that begin here never get SIGINT; this thread gets it afterwards.
-
-    Where the process has other threads, one of them takes the signal at once, which is as good.
+    """Processes and threads that begin here never get SIGINT; this thread, or another one of the
+    process, gets it afterwards.
 
     A terminal sends Ctrl-C to workers too, which would end with tracebacks. The signal mask is
     inherited, also by the worker that a nanny starts in place of a lost one.
@@ -157,11 +153,9 @@ def _result(future: Any, task: Task) -> Outcome:
 
 @contextmanager
 def _watched(client: Any, give_up: Callable[[], object]) -> Iterator[threading.Event]:
-    """Event that is set, before ``give_up`` is called, once no worker has been there for 30 s.
-
-    A worker that ends is started again by its nanny, which gives up itself where that takes too
-    long; tasks of a cluster without workers would wait forever.
-    """
+    """Event that is set, before ``give_up`` is called, once no worker has been there for 30 s. The
+    nanny of a worker that ends gives up where its start takes too long; tasks would wait
+    forever."""
     deserted, over = threading.Event(), threading.Event()
 
     def watch() -> None:

@@ -69,12 +69,9 @@ def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
 
 
 def library_winch(path: str, prefix: str, metadata: str = "") -> str:
-    """Name of a winch in the library.
-
-    ``metadata``: metadata ``winch`` of the run. Returns: the first folder of the path that does not
-    begin with a date, followed by ``/`` and the prefix where the run has prefixes; without such a
-    folder the prefix or the metadata.
-    """
+    """Name of a winch in the library: the first folder of the path that does not begin with a date,
+    and ``/`` and the prefix where the run has prefixes; without such a folder the prefix or the
+    ``metadata``."""
     folders = PurePosixPath(path).parts[:-1]
     named = next((name for name in folders if not _DATE.fullmatch(name)), "")
     return "/".join(filter(None, (named, prefix))) or metadata

@@ -157,10 +157,8 @@ class _Keeping:
             self._write()
 
     def _write(self) -> None:
-        """Replace the rows of these sessions, of other profiles too; estimates first.
-
-        After a kill between the two tables the diagnosis is missing and is computed again.
-        """
+        """Replace the rows of these sessions, of other profiles too; estimates first: after a kill
+        between the two tables the diagnosis is missing and is computed again."""
         outcomes, self.waiting, self.written = self.waiting, [], time.monotonic()
         if not outcomes:
             return

@@ -17,13 +17,9 @@ _COLUMNS = ("path", "programme", "load_mass", "duration", "complete", "fault")
 
 
 def run_faults(tables: Partitions) -> dict[str, str]:
-    """Files of a library whose runs are lost, unreadable or cut short, each with the reason.
-
-    Notes
-    -----
-    A log without its end was cut; a table of numbers has no end, so that its duration is compared
-    with the median of the runs with the same programme and load.
-    """
+    """Files of a library whose runs are lost, unreadable or cut short, each with the reason. A log
+    without its end was cut; the duration of a table of numbers, which has no end, is compared with
+    the median of the runs with the same programme and load."""
     rows = tables.read("runs", _COLUMNS).to_pylist()
     there = {file.path for file in run_files(tables.runs)}
     usual = _usual_durations(rows)

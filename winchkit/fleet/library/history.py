@@ -56,12 +56,9 @@ class LibraryHistory:
 
 
 def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
-    """Choose one effect for every set of effects that the sessions cannot distinguish.
-
-    Returns: the effect that is in most sets, then that in most of the others, and so on: the name
-    of a cause is the same in all sessions. Of effects in equally many sets the one that most
-    diagnoses named.
-    """
+    """Choose one effect for every set of effects that the sessions cannot distinguish: the one in
+    most sets, then that in most of the others, and so on, of equal ones that which most diagnoses
+    named. The name of a cause is then the same in all sessions."""
     left = [tuple(one) for one in sets if one]
     chosen: list[str] = []
     while left:
@@ -196,10 +193,8 @@ def _followed(tables: Partitions, own: Sequence[str], hashes: Mapping[str, str])
 
 
 def _named_sets(tables: Partitions, hashes: Mapping[str, str]) -> list[Sequence[str]]:
-    """Effects of every step: the certain one, or all of its set and of the others at its place.
-
-    ``hashes``: of the winches' present profiles; beside another one other effects are missing.
-    """
+    """Effects of every step: the certain one, or all of its set and of the others at its place, by
+    diagnoses beside the winches' present profiles."""
     columns = ("key", "winch", "kind", "effect", "set", "certain", "place", "profile")
     rows = tables.read("estimates", columns).to_pylist()
     rows = [row for row in rows if row["profile"] == hashes.get(row["winch"], row["profile"])]

@@ -68,10 +68,8 @@ def indexed(folder: str | Path) -> Partitions:
 
 
 def profile_path(profile: str | Path, winch: str) -> Path:
-    """File of a winch's profile; raises FileError.
-
-    ``profile``: profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``).
-    """
+    """File of a winch's profile, or in a folder ``WINCH.toml`` (``/`` as ``-``); raises
+    FileError."""
     from winchkit.catalog import find
 
     if Path(profile).is_dir():
@@ -144,10 +142,8 @@ class _Indexing:
         return self._without_sources(self._read(due, known, report))
 
     def _forget(self, paths: Sequence[str], known: dict[str, list[tuple[Path, Row]]]) -> None:
-        """Remove diagnoses and estimates of runs that are gone, before the rows of these runs.
-
-        After a kill in between the runs are still gone next time, and this is repeated.
-        """
+        """Remove diagnoses and estimates of runs that are gone, before the rows of these runs:
+        after a kill in between this is repeated next time."""
         if not paths:
             return
         gone, winches = set(paths), {row["winch"] for path in paths for _, row in known[path]}

@@ -85,15 +85,9 @@ class Partitions:
     def change(
         self, table: str, drop: Callable[[Row], bool], touched: Iterable[Path], rows: Sequence[Row]
     ) -> None:
-        """Remove rows and add others; the caller holds the lock.
-
-        Raises FileError where a partition cannot be written; it then is as before.
-
-        Notes
-        -----
-        Partitions that only lose rows are written first: a row is missing after a kill, and never
-        there twice.
-        """
+        """Remove rows and add others; the caller holds the lock. Raises FileError where a partition
+        cannot be written; it then is as before. Partitions that only lose rows are written first: a
+        row is missing after a kill, and never there twice."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -117,10 +111,8 @@ class Partitions:
 
     @contextmanager
     def locked(self, table: str, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Exclude other writers of a table meanwhile; waits for one that is writing.
-
-        Raises FileError where the folder cannot be written or its file system has no locks.
-        """
+        """Exclude other writers of a table meanwhile, after one that is writing. Raises FileError
+        where the folder cannot be written or its file system has no locks."""
         _made(self.folder)
         path = self.folder / f"{table}.lock"
         try:

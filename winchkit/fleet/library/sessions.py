@@ -45,14 +45,9 @@ class WinchSession:
 
 
 def winch_sessions(tables: Partitions) -> list[WinchSession]:
-    """Sessions of a library, by winch and time.
-
-    Notes
-    -----
-    Runs of one winch belong together where they have the same metadata ``session`` or, without it,
-    started on the same UTC day: repeats of a programme and load are then in one diagnosis. Of
-    files with the same content the first is taken, since copies are no repeats.
-    """
+    """Sessions of a library, by winch and time: runs with the same metadata ``session`` or, without
+    it, the same UTC day of their start, so that repeats are in one diagnosis. Of files with the
+    same content the first is taken, since copies are no repeats."""
     columns = ("winch", "session", "time", "path", "hash", "prefix", "mapping", "fault")
     groups: dict[tuple[str, str], list[Row]] = {}
     rows = tables.read("runs", columns).to_pylist()

@@ -63,14 +63,18 @@ RUNS: tuple[TableColumn, ...] = (
 )
 """One row per winch of a run; a file that is no run has one row with its `fault`."""
 
-DIAGNOSES: tuple[TableColumn, ...] = (
-    TableColumn(
-        "key", "text", "hash of winch, session, runs, profile, effects, options and version"
-    ),
+_SESSION = (
     TableColumn("winch", "text", "name of the winch in the library"),
     TableColumn("session", "text", "session of the runs"),
     TableColumn("time", "time", "UTC of the first run"),
     TableColumn("runs", "texts", "paths of the runs below the library"),
+)
+
+DIAGNOSES: tuple[TableColumn, ...] = (
+    TableColumn(
+        "key", "text", "hash of winch, session, runs, profile, effects, options and version"
+    ),
+    *_SESSION,
     TableColumn(
         "verdict",
         "text",
@@ -92,10 +96,7 @@ DIAGNOSES: tuple[TableColumn, ...] = (
 
 ESTIMATES: tuple[TableColumn, ...] = (
     TableColumn("key", "text", "that of the diagnosis, or of another fit"),
-    TableColumn("winch", "text", "name of the winch in the library"),
-    TableColumn("session", "text", "session of the runs"),
-    TableColumn("time", "time", "UTC of the first run"),
-    TableColumn("runs", "texts", "paths of the runs below the library"),
+    *_SESSION,
     TableColumn(
         "kind",
         "text",
@@ -138,10 +139,8 @@ TABLES: Mapping[str, tuple[TableColumn, ...]] = {
 
 
 def arrow_schema(table: str) -> pa.Schema:
-    """Arrow schema of a table of the library; units are the metadata ``unit`` of a column.
-
-    Raises UsageError for an unknown table, or without pyarrow.
-    """
+    """Arrow schema of a table of the library; units are the metadata ``unit`` of a column. Raises
+    UsageError for an unknown table, or without pyarrow."""
     try:
         import pyarrow as pa
     except ImportError:

@@ -75,11 +75,8 @@ def task_of(
     effects: tuple[tuple[str, str], ...] = (),
     band: float | None = None,
 ) -> Task:
-    """Task of a session; raises FileError where its winch has no profile.
-
-    ``profile``: profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``). ``band``:
-    cut-off of the torque's low-pass, Hz.
-    """
+    """Task of a session, with its profile, or that of a folder (:func:`.profile_path`), and the
+    ``band`` of the torque's low-pass, Hz; raises FileError where its winch has no profile."""
     path = profile_path(profile, session.winch)
     known = profile_of_runs(path)
     basis = [session.winch, session.session, [[r.path, r.hash, r.prefix] for r in session.runs]]
@@ -119,10 +116,8 @@ def failed(task: Task, reason: str) -> Outcome:
 
 
 def stored_result(found: Mapping[str, Any]) -> str:
-    """JSON of a diagnosis as a table keeps it, at most 20 kB; ``dropped`` names omitted parts.
-
-    ``found``: dictionary that ``winchkit diagnose --json`` prints.
-    """
+    """What ``winchkit diagnose --json`` prints as a table keeps it, at most 20 kB; ``dropped``
+    names omitted parts."""
     stored = {name: found[name] for name in _STORED}
     stored["candidates"] = stored["candidates"][:_CANDIDATES]
     dropped: list[str] = []
@@ -209,10 +204,8 @@ def _values(name: str, estimate: Estimate) -> Row:
 
 
 def _correlate(model: list[Row], answer: WinchAnswer) -> None:
-    """Covariances: correlations of the linearised fit times the standard deviations.
-
-    The standard deviations are wider than those of the linearised fit (intervals.py).
-    """
+    """Covariances: correlations of the linearised fit times the standard deviations, which are
+    wider than those of the linearised fit (intervals.py)."""
     from winchkit.diagnosis.regression.conditioning import value_covariance
 
     result = answer.result

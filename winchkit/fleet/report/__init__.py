@@ -1,5 +1,4 @@
 """Pages and texts of many winches.
 
-``comparison`` is of all winches of a recording, ``history`` and ``text`` of their changes over
-time.
+``comparison`` is of one recording each, ``history`` of their changes over time.
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Place, Step
 from winchkit.fleet.diagnosis.anova import SharedAttribution, SharedError
@@ -45,12 +45,8 @@ _ALL = 0.9
 def shared_effects_text(
     found: Mapping[str, Diagnosis], shared: Sequence[SharedEffect], chances: Mapping[str, float]
 ) -> str:
-    """Diagnoses of all winches, a line each, and their common effects.
-
-    ``chances`` are those of :func:`winchkit.fleet.diagnosis.meta_analysis.alarms`.
-
-    ``chances``: probability of a false alarm by winch. Returns: text of 80 columns.
-    """
+    """Diagnoses of all winches, a line of 80 columns each, with the probabilities of a false alarm
+    (:func:`winchkit.fleet.diagnosis.meta_analysis.alarms`), and their common effects."""
     lines = [f"all {len(found)} winches", *hanging(winch_rows(found, chances), words=2)]
     if shared:
         lines += ["", "effects in common and in single winches"]
@@ -59,10 +55,8 @@ def shared_effects_text(
 
 
 def shared_errors_text(found: Mapping[str, Comparison], shared: Mapping[str, SharedError]) -> str:
-    """Comparisons of all winches, a line each, and the common attribution of their errors.
-
-    Returns: text of 80 columns.
-    """
+    """Comparisons of all winches, a line of 80 columns each, and the common attribution of their
+    errors."""
     lines = [f"all {len(found)} winches", *aligned(error_rows(found))]
     lines += ["", "share of the errors' variance explained by"]
     lines += [line for text in error_texts(shared) for line in paragraph(text, "  ", "    ")]
@@ -126,9 +120,8 @@ def _beside_noise(error: OutputError, scale: PrintScale) -> str:
     return f"{scale.text(error.rms)} ({significant(error.noise_rms / scale.worth, 2)})"
 
 
-def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
+def error_texts(shared: Mapping[str, SharedError]) -> Iterator[str]:
     """Per output the attribution of its errors: ``motor torque (…): direction 87 %, …``."""
-    out = []
     for output, error in shared.items():
         text = "; ".join(_followed(one) for one in error.follows[:_FOLLOWED])
         most = [
@@ -136,8 +129,7 @@ def error_texts(shared: Mapping[str, SharedError]) -> list[str]:
         ]
         off = f"{quantity(error.rms, error.unit)} rms{''.join(most)}"
         name = OUTPUT_NAMES.get(output, output)
-        out.append(f"{name} ({off}): {text or 'no measured variable'}")
-    return out
+        yield f"{name} ({off}): {text or 'no measured variable'}"
 
 
 def _followed(one: SharedAttribution) -> str:
@@ -201,10 +193,8 @@ def shared_effects_html(
     title: str,
     pages: Mapping[str, str],
 ) -> str:
-    """The page over the diagnoses of all winches; ``pages`` are the files of the single ones.
-
-    ``chances``: probability of a false alarm by winch.
-    """
+    """The page over the diagnoses of all winches, with the probabilities of a false alarm;
+    ``pages`` are the files of the single ones."""
     plain = winch_rows(found, chances)
     rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in plain]
     texts = [unbroken(effect_text(one)) for one in shared]

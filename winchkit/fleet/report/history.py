@@ -32,11 +32,9 @@ def fleet_history_html(
     swapped: Sequence[Swap] = (),
     left_out: Sequence[str] = (),
 ) -> str:
-    """The page: a row and a figure per change, limits, odd winches, exchanged profiles.
-
-    ``left_out``: a sentence for each session or run that is not in it, or was cut short. Returns:
-    HTML, self-contained; the most significant changes have figures, in the order of winches.
-    """
+    """The page, self-contained: a row and for the most significant a figure per change, limits, odd
+    winches, exchanged profiles, and a sentence for each session or run ``left_out`` or cut
+    short."""
     changed = history.changed
     drawn = sorted(changed[:_MOST_FIGURES], key=lambda pair: (pair[1].winch, pair[0].effect))
     figures = [_figure(*pair) for pair in drawn]

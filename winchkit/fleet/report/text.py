@@ -51,10 +51,8 @@ class ChangeText:
 def history_text(
     history: FleetHistory, swapped: Sequence[Swap] = (), left_out: Sequence[str] = ()
 ) -> str:
-    """Report of a fleet's history for a terminal.
-
-    ``left_out``: a sentence for each session or run that is not in it, or was cut short.
-    """
+    """Report of a fleet's history for a terminal; ``left_out`` has a sentence for each session or
+    run that is not in it, or was cut short."""
     lines = [line for pair in history.changed for line in _changed(*pair)]
     lines += [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     lines += [line for pair in history.odd for line in odd_texts(*pair)]
@@ -168,10 +166,7 @@ def _value(value: float, std: float, parameter: FleetParameter) -> str:
 
 
 def day_text(time: float) -> str:
-    """Date of a time in s since 1970; in words where there is none.
-
-    ``time``: UTC, s. Returns: ``2026-03-01``.
-    """
+    """Date of a time in s since 1970 (UTC), ``2026-03-01``; in words where there is none."""
     if not isfinite(time):
         return "no earlier bound" if time < 0 else "no later bound"
     try:

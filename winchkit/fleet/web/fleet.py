@@ -32,11 +32,8 @@ class Fleet:
     def fit(
         self, profile: str, effects: Sequence[str], progress: Callable[[str, float], None]
     ) -> None:
-        """Fit every session; raises FileError and UsageError.
-
-        ``profile``: profile of all winches, or a folder with ``WINCH.toml`` for each. ``effects``:
-        by default those that the library's diagnoses name.
-        """
+        """Fit every session, with one profile or a folder of ``WINCH.toml``; by default the effects
+        that the library's diagnoses name. Raises FileError and UsageError."""
         found = library_history(
             self.library.folder,
             profile,
@@ -75,10 +72,8 @@ class Fleet:
         return out
 
     def runs(self, winch: str, time: float) -> dict[str, Any]:
-        """Names of the runs of a winch's session, and the profile that they were fitted with.
-
-        ``time``: start of the session, s since 1970 (UTC).
-        """
+        """Names of the runs of a winch's session (start, s since 1970, UTC), and the profile that
+        they were fitted with."""
         tables = self.library.tables
         for session in [] if tables is None else winch_sessions(tables):
             if session.winch == winch and abs(session.time.timestamp() - time) < 1.0:

@@ -54,10 +54,8 @@ def motor_speed(speed: float, radius: float, ratio: float) -> float:
 
 
 def critical_speed(diameter: float, length: float, ends: str) -> float:
-    """Fastest safe speed of a steel screw, rad/s: 0.8 λ² (d/4) √(E/ρ)/L² (Eq. 16).
-
-    Makers write n = f d/L² · 10⁷ in rpm and mm; fixed at both ends this is their f = 21.9.
-    """
+    """Fastest safe speed of a steel screw, rad/s: 0.8 λ² (d/4) √(E/ρ)/L² (Eq. 16). Makers write n =
+    f d/L² · 10⁷ in rpm and mm; fixed at both ends this is their f = 21.9."""
     return float(_RESERVE * BUCKLES[ends] ** 2 * diameter / 4 * _STEEL_SOUND / length**2)
 
 
@@ -83,11 +81,9 @@ def belt_length(distance: float, first: float, second: float) -> float:
 
 
 def centre_distance(length: float, first: float, second: float) -> float:
-    """Shaft distance for a belt length (Eq. 18 with the squares of the radii corrected), m.
-
-    A = ¼[L − π(R1 + R2) + √((L − π(R1 + R2))² − 8(R2 − R1)²)], an approximation of
-    :func:`belt_length` to second order in (R2 − R1)/A. Raises UsageError for a belt too short.
-    """
+    """Shaft distance for a belt length (Eq. 18 with the squares of the radii corrected), m: A = ¼[L
+    − π(R1 + R2) + √((L − π(R1 + R2))² − 8(R2 − R1)²)], to second order in (R2 − R1)/A. Raises
+    UsageError for a belt too short."""
     straight = length - pi * (first + second)
     if straight < sqrt(8) * abs(second - first):
         raise UsageError(

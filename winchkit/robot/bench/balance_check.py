@@ -169,10 +169,8 @@ class Sources:
 
 
 def sources_of(robot: Robot, wiring: RobotWiring, compliance: Array, *, described: bool) -> Sources:
-    """The sources of a robot: by its calibration or priors, its effects, and rules of thumb.
-
-    ``compliance`` (n,): of the cables, m/N. ``described``: whether the profile has it.
-    """
+    """The sources of a robot: by its calibration or priors, its effects, and rules of thumb;
+    ``compliance`` (n,), m/N, is ``described`` where the profile has it."""
     mass = _stated(robot, "payload-mass.mass", "mass", _MASS * robot.platform.mass)
     centre = [_stated(robot, f"payload-centre.{k}", "length", CENTRE_STD) for k in "xyz"]
     radii = np.array([winch.drum.winding_radius for winch in robot.winches])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 
@@ -40,10 +40,8 @@ def require_within_limits(
     limits: Mapping[str, LimitSpec],
     wiring: RobotWiring,
 ) -> None:
-    """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit.
-
-    The message has the place on the path, the cable, its value and the limit.
-    """
+    """Raise NotPermitted, with the place on the path, where a motion, or a stop on its way, would
+    exceed a limit."""
     found = [
         *_length_faults(robot.names, planned, limits),
         *_rate_faults(robot.names, planned, limits),
@@ -67,14 +65,13 @@ def place_of(pose: Pose, sample: int) -> str:
 
 def _length_faults(
     names: Sequence[str], planned: PlatformTrajectory, limits: Mapping[str, LimitSpec]
-) -> list[_Exceeded]:
-    out = []
+) -> Iterator[_Exceeded]:
     for i, name in enumerate(names):
         length = planned.length[:, i]
         if not np.all(np.isfinite(length)):
             sample = int(np.argmin(np.isfinite(length)))
             words = f"the anchor of cable {name} lies inside its pulley; choose another path"
-            out.append(_Exceeded(sample, words))
+            yield _Exceeded(sample, words)
             continue
         bounds = limits[name].length
         if bounds is None:
@@ -86,14 +83,12 @@ def _length_faults(
                 f"cable {name} would be {length[sample]:.3f} m long, limits.length of its winch "
                 f"is {bounds[0]:g} m to {bounds[1]:g} m; choose another path"
             )
-            out.append(_Exceeded(sample, words))
-    return out
+            yield _Exceeded(sample, words)
 
 
 def _rate_faults(
     names: Sequence[str], planned: PlatformTrajectory, limits: Mapping[str, LimitSpec]
-) -> list[_Exceeded]:
-    out = []
+) -> Iterator[_Exceeded]:
     rate = np.gradient(planned.length, planned.time, axis=0)
     change = np.gradient(rate, planned.time, axis=0)
     for i, name in enumerate(names):
@@ -110,24 +105,20 @@ def _rate_faults(
                     f"{largest:.3g} {unit} at most, limits.{what} of its winch is {limit:g} "
                     f"{unit}; move at {limit / largest:.0%} of this {what}"
                 )
-                out.append(_Exceeded(sample, words))
-    return out
+                yield _Exceeded(sample, words)
 
 
 def _force_faults(
     robot: Robot, planned: PlatformTrajectory, tension: ForceLimits, deceleration: float
-) -> list[_Exceeded]:
-    """The planned motion at every sample, and a stop at up to 200 of them.
-
-    A hanging platform is planned at rest in each pose; its swinging in a stop is not known.
-    """
-    out = []
+) -> Iterator[_Exceeded]:
+    """The planned motion at every sample, and a stop at up to 200 of them. The swinging of a
+    hanging platform in a stop is not known."""
     without = np.flatnonzero(~np.isfinite(planned.force).all(axis=1))
     if len(without):
         wrench = dynamic_wrench(robot.platform, planned.motion)
-        out.append(_without_forces(robot, planned, tension, wrench, int(without[0])))
+        yield _without_forces(robot, planned, tension, wrench, int(without[0]))
     if robot.hangs:
-        return out
+        return
     first, _ = planned.path.derivatives(planned.distance)
     moving = np.where(planned.speed[:, None] > 0, 1.0, 0.0)
     braked = planned.motion.acceleration - deceleration * moving * first
@@ -138,34 +129,27 @@ def _force_faults(
     force = distributed_forces(structure[stations], wrench[stations], tension)
     without = stations[~np.isfinite(force).all(axis=1)]
     if len(without):
-        first_one = int(without[0])
-        out.append(
-            _without_forces(robot, planned, tension, wrench, first_one, when=" during a stop")
-        )
-    return out
+        k = int(without[0])
+        yield _without_forces(robot, planned, tension, wrench, k, when=" during a stop")
 
 
 def _clearance_faults(
     robot: Robot, planned: PlatformTrajectory, wiring: RobotWiring
-) -> list[_Exceeded]:
-    """Cables that come nearer to each other or to a body than the clearance, and than they are.
-
-    No point of the platform moves by more than a quarter of the clearance between two samples.
-    """
+) -> Iterator[_Exceeded]:
+    """Cables that come nearer to each other or to a body than the clearance, and than they are. No
+    point of the platform moves by more than a quarter of the clearance between two samples."""
     if wiring.clearance is None:
-        return []
+        return
     count = ceil(4 * planned.path.length / wiring.clearance) + 1
     places = np.linspace(0.0, planned.path.length, max(count, 2))
     stations = np.unique(np.searchsorted(planned.distance, places).clip(0, len(planned.time) - 1))
     pose = planned.pose[stations]
     found = distances(robot, wiring.body, pose, wiring.clearance)
     limit = np.minimum(wiring.clearance, found.distance[0] - _NEARER)
-    out = []
     for column in np.flatnonzero(np.any(found.distance < limit, axis=0)).tolist():
         row = int(np.argmax(found.distance[:, column] < limit[column]))
         words = f"{found.text(row, column)}; choose another path"
-        out.append(_Exceeded(int(stations[row]), words))
-    return out
+        yield _Exceeded(int(stations[row]), words)
 
 
 def _without_forces(

@@ -31,10 +31,8 @@ class Computation(Protocol):
     def __call__(
         self, meanwhile: Callable[[], None], function: Callable[..., T], /, *arguments: Any
     ) -> T:
-        """Result of ``function(*arguments)``, or what it raises.
-
-        ``meanwhile`` is called again and again until then; what it raises ends the wait.
-        """
+        """Result of ``function(*arguments)``, or what it raises; ``meanwhile`` is called again and
+        again until then, and ends the wait by what it raises."""
 
 
 def at_once(meanwhile: Callable[[], None], function: Callable[..., T], /, *arguments: Any) -> T:
@@ -64,13 +62,8 @@ class ComputationProcess:
     def __call__(
         self, meanwhile: Callable[[], None], function: Callable[..., T], /, *arguments: Any
     ) -> T:
-        """Result of ``function(*arguments)``; raises what it raises, and what ``meanwhile`` does.
-
-        Raises
-        ------
-        WinchkitError
-            Where the process has ended.
-        """
+        """Result of ``function(*arguments)``; raises what it or ``meanwhile`` raises, and
+        WinchkitError where the process has ended."""
         try:
             self._pipe.send((function, arguments))
             while not self._pipe.poll(_POLL):

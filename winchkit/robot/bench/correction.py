@@ -34,9 +34,7 @@ class Loop(Protocol):
 
     def speeds(self, time: float, now: float, wound: Array) -> Array | None:
         """Winding speeds (n,), m/s, once a cycle; None for rest, without a valid measurement.
-
-        ``wound`` (n,): cable that the motors have wound in since the start, m.
-        """
+        Motors have ``wound`` in (n,), m, since the start."""
 
     def left(self, index: int) -> str:
         """What is left to correct of a cable, in words."""
@@ -66,11 +64,9 @@ class Correction:
         latch: Latch,
         elongating: Array,
     ) -> None:
-        """Take ``lasts``: whether it goes on, by its duration so far and the true time (s).
-
-        ``latch`` takes the trip of a travel that is used up. ``elongating`` (n, n): what of the
-        wound cable changes forces and not the pose.
-        """
+        """Take ``lasts``: whether it goes on, by its duration so far and the true time (s);
+        ``latch`` takes the trip of a travel that is used up. ``elongating`` as of
+        :func:`.corrections.elongating`."""
         count = len(bounds.names)
         self.loops = loops
         self.ended = False
@@ -104,10 +100,8 @@ class Correction:
         return float(np.abs(self._speed).max()) / self._acceleration
 
     def at(self, index: int, time: float, now: float) -> tuple[float, float]:
-        """Cable wound in since the start (m) and winding speed (m/s) of a winch.
-
-        The first winch that asks in a cycle advances all.
-        """
+        """Cable wound in since the start (m) and winding speed (m/s) of a winch; the first winch
+        that asks in a cycle advances all."""
         if time != self._cycle:
             self._advance(time, now)
         return float(self._travelled[index]), float(self._speed[index])

@@ -82,13 +82,9 @@ class Corrections:
         path: PathForces | None = None,
         watched: bool = True,
     ) -> ForceLoop:
-        """The control of the forces (1, n) at a pose, at motor angles (n,), or along a ``path``.
-
-        A path has k poses and forces (k, n). ``watched``: whether readings that contradict the
-        weight trip the bench.
-
-        Raises NotPermitted for a winch without a cell, or forces that its drive does not give.
-        """
+        """The control of the forces (1, n) at a pose, or (k, n) along a ``path`` of k poses,
+        ``watched`` where readings that contradict the weight trip the bench. Raises NotPermitted
+        for a winch without a cell, or forces that its drive does not give."""
         delays = []
         for winch in self.winches:
             winch.require_length()
@@ -134,11 +130,9 @@ class Corrections:
     def check(
         self, pose: Pose, force: Array, angles: Array, stiffness: Array, *, known: bool
     ) -> BalanceCheck:
-        """What readings at k poses with planned forces (k, n) are compared with.
-
-        ``angles``, ``stiffness`` (n,): motor angles at the first, and of the cables, N/m; upper
-        bounds where they are not ``known``.
-        """
+        """What readings at k poses with planned forces (k, n) are compared with; ``angles`` (n,)
+        are those of the first pose, ``stiffness`` (n,), N/m, an upper bound where it is not
+        ``known``."""
         described = bool(np.all(self._elongation(angles, force[0]) > 0))
         compliance = (1.0 if known else SOFTER) / stiffness
         sources = sources_of(self.robot, self.wiring, compliance, described=described)
@@ -161,11 +155,9 @@ class Corrections:
             )
 
     def pose_loop(self, goal: Pose, tracker: TrackerReceiver | None, travel: float) -> PoseLoop:
-        """The control of the pose by the tracker.
-
-        Raises NotPermitted where the tracker's numbers are not known, it shows nothing, or it shows
-        the platform farther from the goal than the travel of the cables (m) reaches.
-        """
+        """The control of the pose by the tracker. Raises NotPermitted where the tracker's numbers
+        are not known, it shows nothing, or the goal is farther than the travel of the cables (m)
+        reaches."""
         robot, wiring = self.robot, self.wiring
         by_pose = -robot.structure(goal)[0].T
         spec = robot.profile.instrument.tracker
@@ -229,10 +221,8 @@ class Corrections:
     def _stiffness(
         self, pose: Pose, force: Array, angles: Array, axial_stiffness: float | None
     ) -> tuple[Array, bool]:
-        """Stiffness of each cable (n,), N/m, and whether it is known rather than a bound.
-
-        The declared one, else that of the effects of the profile, else a bound by the profile.
-        """
+        """Stiffness of each cable (n,), N/m, declared or by the effects of the profile, and whether
+        it is known; else a bound by the profile."""
         robot, declared = self.robot, axial_stiffness or self.wiring.axial_stiffness
         length = robot.lengths(pose)[0]
         if declared is not None:
@@ -264,11 +254,9 @@ class Corrections:
 
 
 def elongating(loops: Sequence[Loop], count: int) -> Array:
-    """What of the cable that loops wind in changes forces and not the pose, (n, n).
-
-    Of both together: a change of the cables by forces that balance each other, and one that the
-    platform follows, are a basis of all changes.
-    """
+    """What of the cable that loops wind in changes forces and not the pose, (n, n). A change by
+    forces that balance each other, and one that the platform follows, are a basis of all
+    changes."""
     forces = next((one.setting for one in loops if isinstance(one, ForceLoop)), None)
     poses = next((one.by_pose for one in loops if isinstance(one, PoseLoop)), None)
     if forces is None:

@@ -117,10 +117,8 @@ class ForceLoop:
         latch: Latch,
         path: PathForces | None = None,
     ) -> None:
-        """Take ``readings`` of the forces at a time (s), (n,), NaN without a valid one.
-
-        With a ``path`` the set-point is the planned one of the present place.
-        """
+        """Take ``readings`` of the forces at a time (s), (n,), NaN without a valid one; with a
+        ``path`` the set-point is the planned one of the present place."""
         self.setting = setting
         self.force = setting.force
         """Set-point, (n,), N."""

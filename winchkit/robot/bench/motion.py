@@ -27,10 +27,8 @@ class CableMotion:
         trim: CableCorrection | None = None,
         along: bool = False,
     ) -> None:
-        """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s).
-
-        ``trim`` corrects the cable forces at the end, or ``along`` the motion.
-        """
+        """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s); ``trim``
+        corrects the cable forces at the end, or ``along`` the motion."""
         self.holds = holds
         self.clock = clock
         self.trim = trim

@@ -70,23 +70,18 @@ class PlatformPath:
         return Pose(point[:, :3], rotation_by(point[:, 3:] / self.scale) @ self.start)
 
     def derivatives(self, distance: Array) -> tuple[Array, Array]:
-        """First and second derivative of the pose by s, (k, 6) each.
-
-        Of the position, 1 and 1/m, then angular in base axes, rad/m and rad/m².
-        """
+        """First and second derivative of the pose by s, (k, 6) each: of the position, then angular
+        in base axes."""
         point, first, second = (self.curve(distance, order) for order in range(3))
         turning = rotation_rates(*(one[:, 3:] / self.scale for one in (point, first, second)))
         return np.hstack([first[:, :3], turning[0]]), np.hstack([second[:, :3], turning[1]])
 
 
 def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> list[PlatformPath]:
-    """Smooth paths from a pose through waypoints, each from a stop to the next one.
-
-    ``waypoints``: where to go. A corner is blended by a curve of Bézier of degree five with no
-    curvature at its ends, of at most half of the adjacent lines. ``scale``: ρ, m. Returns: those
-    of length zero are left out. Raises UsageError for an arc through points on a line, or a
-    rotation beyond 160 degrees.
-    """
+    """Smooth paths from a pose through waypoints, each from a stop to the next one, but for those
+    of length zero. A corner is a Bézier curve of degree five with no curvature at its ends, of at
+    most half of the adjacent lines. Raises UsageError for an arc through points on a line, or a
+    rotation beyond 160 degrees."""
     here = Waypoint(start.position[0], start.rotation[0])
     paths = []
     group: list[Waypoint] = []

@@ -11,11 +11,8 @@ _SHORTEST_STOP = 0.1
 
 
 class PathTime:
-    """Time along a planned motion, the same for all winches in a cycle.
-
-    A stop along the path lets it advance more and more slowly: the platform decelerates on its
-    path, and all cables come to rest together.
-    """
+    """Time along a planned motion, the same for all winches in a cycle. It slows down in a stop:
+    the platform decelerates on its path, and all cables come to rest together."""
 
     def __init__(self, planned: PlatformTrajectory, deceleration: float) -> None:
         """``deceleration`` of a stop, m/s^2 along the path."""
@@ -31,10 +28,8 @@ class PathTime:
         self._lock = threading.Lock()
 
     def at(self, time: float) -> tuple[float, float]:
-        """Time along the motion (s) and its rate at the time of motion ``time`` (s).
-
-        The first winch that asks in a cycle advances it.
-        """
+        """Time along the motion (s) and its rate at the time of motion ``time`` (s); the first
+        winch that asks in a cycle advances it."""
         with self._lock:
             if self._cycle is None:
                 self._cycle = time

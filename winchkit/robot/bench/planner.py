@@ -20,11 +20,11 @@ from winchkit.robot.forces.force_distribution import ForceLimits
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.bench import BenchSpec, LimitSpec
+from winchkit.schema.profiles.robot import COORDINATES
 from winchkit.schema.robot_bench import RobotWiring
 
 _GUIDED = 1e-6
 """Difference from a coordinate that guides hold, m and rad, that is rounding."""
-_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,10 @@ class Planner:
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> list[PlatformTrajectory]:
-        """Plan motions through waypoints and compare them with all limits.
-
-        ``waypoints``: poses to go to; the platform stops at each that is not blended. ``speed``,
-        ``acceleration``: of the platform, m/s and m/s²; by default the limits of ``[robot]``.
+        """Plan motions through waypoints, with a stop at each that is not blended, and compare them
+        with all limits; speed (m/s) and acceleration (m/s²) are by default those of ``[robot]``.
         Raises UsageError for what is no pose, or no number; NotPermitted for a limit that would be
-        exceeded on the way, or by a stop.
-        """
+        exceeded on the way, or by a stop."""
         for waypoint in waypoints:
             if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
                 raise UsageError("move: a pose with numbers that are not finite is no goal")
@@ -97,16 +94,16 @@ def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
     """A pose with some of its coordinates replaced or changed."""
     new = _six(pose)
     for name, value in change.items():
-        if name not in _COORDINATES:
-            raise UsageError(f"'{name}' is no coordinate of a pose: {', '.join(_COORDINATES)}")
-        index = _COORDINATES.index(name)
+        if name not in COORDINATES:
+            raise UsageError(f"'{name}' is no coordinate of a pose: {', '.join(COORDINATES)}")
+        index = COORDINATES.index(name)
         new[index] = number("move", name, value) + (new[index] if relative else 0.0)
     return Pose(new[None, :3], rotation_of(*new[3:])[None])
 
 
 def coordinates_of(pose: Pose) -> dict[str, float]:
     """One pose as x, y, z (m), roll, pitch and yaw (rad)."""
-    return {name: float(value) for name, value in zip(_COORDINATES, _six(pose), strict=True)}
+    return {name: float(value) for name, value in zip(COORDINATES, _six(pose), strict=True)}
 
 
 def _six(pose: Pose) -> Array:

@@ -58,11 +58,9 @@ class TrackerWatch:
         self._place = self._first = np.zeros(6)
 
     def at(self, now: float, newest: TrackedPose | None, place: Array, moved: Array) -> Trip | None:
-        """Trip that the newest pose of the tracker is a reason for.
-
-        ``place`` (6,): its position and rotation vector, m and rad. ``moved`` (6,): of the platform
-        since the start by the motor angles. The first call is the start.
-        """
+        """Trip that the newest pose, at the ``place`` (6,) by the tracker, is a reason for; the
+        platform has ``moved`` (6,) since the start, the first call, by the motor angles. m and
+        rad."""
         last = self._last
         if newest is not None and (last is None or _differs(newest, last)):
             step = 0.0 if last is None else newest.received - last.received
@@ -134,11 +132,8 @@ class PoseLoop:
         *,
         numbers: Tracker | None = None,
     ) -> None:
-        """Hold ``goal``, one pose.
-
-        ``by_pose`` (n, 6): derivatives of the cable lengths. ``newest``: newest pose of the
-        tracker. ``numbers``: of the tracker; None where it shows poses in the base frame.
-        """
+        """Hold ``goal``, one pose, by derivatives (n, 6) of the cable lengths and the tracker's
+        newest pose; ``numbers`` of the tracker, None where it shows poses in the base frame."""
         self.goal = goal
         self.error = np.full(6, math.nan)
         """Position (m) and rotation vector (rad) of the newest pose from the goal, (6,)."""

@@ -33,11 +33,8 @@ def programme_files(programme: RobotProgramme, folder: str | Path, suffix: str) 
 def planned_motions(
     planner: Planner, programme: RobotProgramme, start: Pose
 ) -> tuple[Motions, Pose]:
-    """Plan one repeat and compare it with all limits; nothing moves.
-
-    Returns: ``motions``: motions from stop to stop, and holds in s. Raises NotPermitted for a limit
-    that would be exceeded, with the number of the step.
-    """
+    """Plan one repeat, with the pose at its end, and compare it with all limits; nothing moves.
+    Raises NotPermitted, with the number of the step, for a limit that would be exceeded."""
     out: Motions = []
     here = at = start
     group: list[Waypoint] = []
@@ -68,17 +65,12 @@ def run_robot_programme(
     check: Callable[[], None] = lambda: None,
     replace_files: bool = False,
 ) -> list[Path]:
-    """Run a programme of the platform, and log one run per repeat.
+    """Run a programme of the platform, and log one run per repeat; ``check`` is called before each
+    motion and every 20 ms of a hold, and ends the programme by what it raises.
 
-    ``suffix``: format, ``.csv`` or ``.mcap``. ``check``: called before each motion and every 20 ms
-    of a hold; what it raises ends the programme. Returns: files written, in order. Raises
-    UsageError before any motion, where a file exists and is not to be replaced; NotPermitted before
-    any motion, for a limit that would be exceeded on the way; MotionError: whatever stops a motion;
-    rows logged until then are kept.
-
-    Notes
-    -----
-    With repeats the platform first moves, not logged, to the pose at which a repeat ends.
+    Raises UsageError and NotPermitted before any motion, for a file that is not to be replaced and
+    a limit that would be exceeded; MotionError for what stops a motion, with the rows until then
+    kept. With repeats the platform first moves, not logged, to the pose at which a repeat ends.
     """
     files = programme_files(programme, folder, suffix)
     held = [path for path in files if path.exists()]

@@ -1,9 +1,8 @@
 """Calibration of a robot by its own bench: drive to poses, measure at rest, fit, validate.
 
-The procedure of the CABTIVE paper (Lessanibahri et al., section IV) in one call. Poses for the fit
-and for the validation are drawn at random in a box about home; each is planned, so that a pose that
-the cables cannot hold within the limits is drawn again. The platform stands still while the tracker
-and the load cells are averaged. Poses of the validation are never used in the fit.
+The procedure of the CABTIVE paper (Lessanibahri et al., section IV). Poses are drawn at random in a
+box about home; one that the cables cannot hold within the limits is drawn again. Poses of the
+validation are never used in the fit.
 
 Cables are moved by their lengths, so that errors of the geometry change the cable forces, the more
 the farther the platform is from where these were right: 1 mm of a steel cable of 20 N/mm are 20 N.
@@ -45,7 +44,7 @@ from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.robot import COORDINATES, RobotProfile
 from winchkit.schema.read import read_robot
 
 if TYPE_CHECKING:
@@ -53,8 +52,7 @@ if TYPE_CHECKING:
 
 _TRIES = 40
 """Draws of one pose, of which one is to be within the limits."""
-_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
-_CHANNELS = tuple(f"platform_{axis}" for axis in _AXES)
+_CHANNELS = tuple(f"platform_{axis}" for axis in COORDINATES)
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 _POLL = 0.05
 """s: 20 readings of all instruments in a dwell of 1 s."""
@@ -219,10 +217,7 @@ def recorded_poses(
     first: Run | None = None,
     session: str = "",
 ) -> Run:
-    """Measure poses, a row each.
-
-    ``rows``, iterator of (m,) arrays.
-    """
+    """Measure poses, a row each, beside those of ``first``."""
     lines = bench.robot.robot.names
     units = {
         **{f"{line}.motor_angle": "rad" for line in lines},
@@ -263,10 +258,8 @@ class _Driver:
         self._began = bench.clock.now()
 
     def refine(self, fit: Run, options: Options | None) -> None:
-        """Plan with the robot that fits the poses so far, and restore the preload.
-
-        Without a load cell at each winch that is left as it is.
-        """
+        """Plan with the robot that fits the poses so far, and restore the preload, where each winch
+        has a load cell."""
         found = self._compute(self._look, _refitted, self.bench.spec, fit, options)
         if found is not None:
             self._planner = replace(self._planner, robot=found)
@@ -280,7 +273,7 @@ class _Driver:
         home = self.bench.robot.robot.home
         for _ in range(count):
             for _ in range(_TRIES):
-                change = dict(zip(_AXES, random.uniform(-reach, reach).tolist(), strict=True))
+                change = dict(zip(COORDINATES, random.uniform(-reach, reach).tolist(), strict=True))
                 if self._go(moved(home, change, relative=True)):
                     break
             else:

@@ -66,12 +66,8 @@ def plan_along(
     speed: float,
     acceleration: float,
 ) -> PlatformTrajectory:
-    """Plan an S-curve along a path, and the cables with it.
-
-    Notes
-    -----
-    On a curved path tangential and centripetal acceleration each get acceleration/√2.
-    """
+    """Plan an S-curve along a path, and the cables with it. On a curved path tangential and
+    centripetal acceleration each get acceleration/√2."""
     curved = path.curvature * path.length > 1e-6
     tangential = acceleration / sqrt(2) if curved else acceleration
     fastest = min(speed, sqrt(tangential / path.curvature)) if curved else speed
@@ -94,10 +90,8 @@ def plan_along(
 def _hanging(
     robot: Robot, motion: PlatformMotion, limits: ForceLimits
 ) -> tuple[PlatformMotion, Array]:
-    """The motion in the poses of rest of a hanging platform, and the forces there; NaN without one.
-
-    Its swinging about them is no part of the plan.
-    """
+    """The motion in the poses of rest of a hanging platform, and the forces there, NaN without one;
+    its swinging about them is no part of the plan."""
     rest = rest_poses(robot, motion.pose)
     low, high = limits.between(len(robot.names))
     within = np.asarray(np.all((low <= rest.force) & (rest.force <= high), axis=1))
@@ -109,11 +103,8 @@ def _hanging(
 
 
 def motion_at(path: PlatformPath, distance: Array, rate: Array, change: Array) -> PlatformMotion:
-    """Motion of the platform at places of a path.
-
-    ``distance``, ``rate``, ``change`` (k,): along it, with first and second derivative by time, m,
-    m/s and m/s². Returns: k samples.
-    """
+    """Motion of the platform at places of a path; ``distance`` (k,) along it, m, with its first and
+    second derivative by time."""
     first, second = path.derivatives(distance)
     velocity = first * rate[:, None]
     acceleration = second * rate[:, None] ** 2 + first * change[:, None]
@@ -121,14 +112,9 @@ def motion_at(path: PlatformPath, distance: Array, rate: Array, change: Array) -
 
 
 def quick_stop_ramps(planned: PlatformTrajectory, arms: Array, deceleration: float) -> Array:
-    """Decelerations of the motors, (n,), rad/s^2, with which all cables stop in the same time.
+    """Decelerations of the motors, (n,), rad/s^2, with which all cables stop in the same time, the
+    fastest with ``deceleration``, m/s^2; ``arms`` (n,) have no sign, m/rad.
 
-    ``arms`` (n,): cable per motor angle, without sign, m/rad. ``deceleration``: of the fastest
-    cable, m/s^2. Returns (n,): in proportion to the largest speeds of the cables; of a cable slower
-    than a tenth of the fastest, as if it had this speed.
-
-    Notes
-    -----
     A quick stop of the drives decelerates each motor by its own 6085h. The speeds of the cables are
     not in the same proportion everywhere on a path: a cable at the share x of its largest speed
     rests after the share x of the common time.

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from winchkit.robot.bench.platform import Platform
 from winchkit.robot.bench.wiring import robot_of_bench
+from winchkit.robot.geometry.kinematics import lever_of
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.instruments import FrameSpec
@@ -45,14 +44,12 @@ class RobotOfBench:
 
     @property
     def truth(self) -> PlatformTruth:
-        """The platform of a rehearsal, as the profile declares it.
-
-        Without a moment of inertia its mass is at the anchor points; cables without a stiffness
-        have one at which the middle of ``tension`` stretches them by half a per cent, as of fibre.
-        """
+        """The platform of a rehearsal, as the profile declares it. Without a moment of inertia its
+        mass is at the anchor points; cables without a stiffness have one at which the middle of
+        ``tension`` stretches them by half a per cent, as of fibre."""
         profile, wiring = self.robot.profile, self.wiring
-        size = float(np.mean(np.sum(self.robot.geometry.anchor_point**2, axis=1)))
-        inertia = profile.platform.inertia or (2 / 3 * size * self.mass,) * 3
+        there = 2 / 3 * lever_of(self.robot.geometry) ** 2 * self.mass
+        inertia = profile.platform.inertia or (there,) * 3
         middle = sum(wiring.tension) / 2
         declared = [line.profile.cable.axial_stiffness for line in self.robot.lines]
         stiffness = min((one for one in declared if one is not None), default=middle / _STRETCH)

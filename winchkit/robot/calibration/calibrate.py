@@ -1,18 +1,13 @@
 """Calibration of a cable robot: geometry and winches from poses with any kind of measurement.
 
-    result = calibrate(robot, read_poses(runs, robot.profile))
-    result.estimates["1.exit_point.x"].value
+The estimate is the maximum of the posterior over all poses and parameters at once: the cost is
+½ Σ (r/σ)² + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The CABTIVE paper
+(Lessanibahri et al., Eq. 5 and 6) solves the forward kinematics of every pose inside each
+evaluation of its cost; here the pose is an unknown beside the parameters, so that all cable
+equations count.
 
-The estimate is the maximum of the posterior over all poses and parameters at once, with the
-constraint equations of :mod:`winchkit.robot.geometry.constraints`. The CABTIVE paper (Lessanibahri
-et al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
-here the pose is an unknown beside the parameters, so that all cable equations count.
-
-The cost is ½ Σ (r/σ)² + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
-deviations σ by kind of measurement are variance components
-(:mod:`winchkit.robot.identification.variance_components`): fit and estimate alternate until σ
-changes by less than 3 %, at most eight times. Poses with gross errors
-(:mod:`winchkit.robot.calibration.outliers`) are left out, and all is fitted again without them.
+Fit and standard deviations σ (variance components) alternate until σ changes by less than 3 %, at
+most eight times. Poses with gross errors are left out, and all is fitted again without them.
 """
 
 from __future__ import annotations
@@ -160,13 +155,9 @@ class Calibrated(Plotted, Tabular):
 
     @property
     def noise_ratio(self) -> float:
-        """Held-out error over the noise of the instruments: of positions, else of lengths.
-
-        The noise is that of ``Options.sigma``, else of usual instruments
-        (:data:`~winchkit.robot.identification.variance_components.START`). A real robot,
-        with cables, pulleys and a frame that no model has, is at 5 to 20. NaN without held-out
-        poses.
-        """
+        """Held-out error over the noise of the instruments, known or usual: of positions, else of
+        lengths. A real robot, with cables, pulleys and a frame that no model has, is at 5 to 20.
+        NaN without held-out poses."""
         place = rms(self.validation_after.distance)
         if isfinite(place):
             return place / (3**0.5 * self.instrument_noise["position"])
@@ -214,10 +205,8 @@ def split(measured: MeasuredPoses) -> tuple[MeasuredPoses, MeasuredPoses]:
 
 
 def _unlike(validation: MeasuredPoses, fit: MeasuredPoses) -> tuple[MeasuredPoses, tuple[str, ...]]:
-    """Poses for the held-out error that are not among those to fit, and how many are.
-
-    Raises RunError where all are.
-    """
+    """Poses for the held-out error that are not among those to fit, and a note of the others;
+    raises RunError where all are."""
     again = copies(validation, fit)
     if len(validation) and again.all():
         raise RunError(
@@ -346,10 +335,8 @@ def calibrate(
 
 
 def equations_of(robot: Robot, measured: MeasuredPoses, options: Options) -> RobotEquations:
-    """Constraint equations of measured poses with the parameters of an option's effects.
-
-    Raises UsageError where a measurement is missing that an effect needs.
-    """
+    """Constraint equations of measured poses with the parameters of an option's effects; raises
+    UsageError where a measurement is missing that an effect needs."""
     instruments = declared_instruments(robot, measured)
     parameters = parameters_of(robot, measured, options.effects, instruments)
     tension = bool(np.any(np.isfinite(measured.tension)))

@@ -84,11 +84,9 @@ def observability(equations: RobotEquations, solution: Solution, weights: Weight
 def _significant_information(
     equations: RobotEquations, solution: Solution, weights: Weights
 ) -> Array:
-    """Information at poses whose rotations are replaced by their significant part.
-
-    A platform that never turned seems to turn by the noise of its estimated poses, which would
-    make exit and anchor points seem identifiable. Zeros of instruments are eliminated.
-    """
+    """Information, zeros of instruments eliminated, at poses with the significant part of their
+    rotations: a platform that never turned seems to turn by the noise of its poses, which would
+    make exit and anchor points seem identifiable."""
     pose, many = solution.state.pose, len(solution.state.pose.rotation)
     mean, home = mean_rotation(pose.rotation), equations.robot.home.rotation[0]
     turned = rotation_vector(pose.rotation @ mean.T)
@@ -259,8 +257,7 @@ def _refuse_out_of_reach(equations: RobotEquations) -> None:
 
 
 def _refuse_other_motions(equations: RobotEquations) -> None:
-    """Refuse positions that the declared degrees of freedom do not permit, and cables in a plane
-    of a platform that is said to move in space."""
+    """Refuse positions and planes of cables that contradict the declared degrees of freedom."""
     robot = equations.robot
     if robot.hangs and (names := robot.planar):
         listed = ", ".join(f'"{name}"' for name in names)

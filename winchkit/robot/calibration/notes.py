@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from winchkit.arrays import Array
@@ -41,12 +43,11 @@ _OF_TRACKER = {
 }
 
 
-def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> list[str]:
+def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> Iterator[str]:
     """Numbers of instruments that were fitted, and the datum, in words."""
     before = declared.instruments.free if declared.instruments else frozenset()
-    out = []
     if found := [text for name, text in _OF_TRACKER.items() if name in chosen.free - before]:
-        out.append(
+        yield (
             f"the poses require {' and '.join(found)} to be other than the robot's file has: "
             "fitted beside the geometry. Declare it as unknown in [instrument]"
         )
@@ -56,22 +57,21 @@ def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> list[str]:
             "robot": "the robot's base frame, by the home pose and the priors of the exit points",
             "tracker": "the tracker's frame; exit points and home pose are written in it",
         }
-        out.append(f"datum: {kept[own]}")
+        yield f"datum: {kept[own]}"
     if "reflector" in chosen.free:
-        out.append(
+        yield (
             "datum of the platform: its anchor points at the home pose; a common shift of all "
             "anchor points and of the home pose is the same as another reflector offset"
         )
     if "cell_gain" in chosen.free:
-        out.append(
+        yield (
             "datum of the forces: the platform's mass; a common gain of all cells is the same as "
             "another mass"
         )
     if "mounting" in chosen.free and "position" not in chosen.equations.kinds:
-        out.append(
+        yield (
             "a bias of roll and pitch is the same as the IMU's mounting: reported as the mounting"
         )
-    return out
 
 
 def home_notes(given: RobotEquations, fitted: RobotEquations, values: Array) -> list[str]:
@@ -122,10 +122,8 @@ def warnings_of(
     observed: Observability,
     unfound: int,
 ) -> tuple[str, ...]:
-    """What a fit leaves open: bounds, noise, and values that rest on the prior.
-
-    ``unfound``: held-out poses that were not found.
-    """
+    """What a fit leaves open: bounds, noise, values that rest on the prior, and ``unfound``
+    poses."""
     out = [*equations.measured.notes, *_left_out(equations)]
     out += outside_bounds(equations.parameters)
     if unfound:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,22 +43,13 @@ _CAUSES = {
 
 
 def gross_errors(equations: RobotEquations, values: Array, weights: Weights) -> NDArray[np.bool_]:
-    """Poses with a reading far from what the others predict, (p,).
+    """Poses with a reading far from what the others predict, (p,); none where they are more than a
+    third: then the model is wrong, or the standard deviations.
 
-    ``values`` (q,), ``weights``: of a fit to which wrong poses may have contributed. More than a
-    third of the poses are none: then the model is wrong, or the standard deviations.
-
-    Notes
-    -----
-    Least trimmed squares: the fit of the two thirds of the poses that fit best, repeated with the
-    poses that fit it best until these stay the same (concentration). The misfit of a pose is the
-    root of the mean square of its residuals at the pose that fits them best, in standard deviations
-    of their prediction by the others; those of the readings are the median absolute residuals of
-    each kind. Which reading of a pose is wrong is not asked.
-
-    References
-    ----------
-    P. J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
+    Least trimmed squares: the fit of the two thirds of the poses that fit best, repeated until
+    these stay the same (concentration). A pose's misfit is the root of the mean square of its
+    residuals, in standard deviations of their prediction by the others, where it fits them best. P.
+    J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
     """
     state = place(equations, BundleState(values, equations.start(values)), weights)
     weights = _robust_weights(equations, state)
@@ -79,10 +72,8 @@ def gross_errors(equations: RobotEquations, values: Array, weights: Weights) -> 
 
 
 def far_off(distance: Array) -> NDArray[np.bool_]:
-    """Held-out poses whose measured position is far from the predicted one, (p,).
-
-    ``distance`` (p,): NaN where not known. As in the fit, more than a third are none.
-    """
+    """Held-out poses whose position is far from the predicted one, (p,), by distances (p,), NaN
+    where not known; as in the fit, more than a third are none."""
     known = distance[np.isfinite(distance)]
     usual = float(np.median(known)) if len(known) else np.inf
     wrong = distance > _LIMIT * max(usual, NOISE["position"].least)
@@ -122,15 +113,10 @@ def _misfit(
     return np.asarray(np.sqrt(square / np.maximum(linear.stack.known.sum(axis=1), 1)))
 
 
-def unexplained(equations: RobotEquations, solution: Solution) -> list[str]:
-    """One sentence per kind of instrument at the lines that does not show the predicted motion.
-
-    Notes
-    -----
-    With the readings of every line about their mean, R² is below a half although at least a half
-    of their variance is predicted: an instrument that hardly moves says nothing.
-    """
-    out = []
+def unexplained(equations: RobotEquations, solution: Solution) -> Iterator[str]:
+    """One sentence per kind of instrument at the lines that does not show the predicted motion:
+    less than half of its variance is explained, though at least half is predicted. An instrument
+    that hardly moves says nothing."""
     readings = {
         "swivel": equations.measured.swivel,
         "cable_length": equations.measured.cable_length,
@@ -145,12 +131,11 @@ def unexplained(equations: RobotEquations, solution: Solution) -> list[str]:
             count = np.count_nonzero(np.isfinite(residual))
             unit, factor = ("deg", 180 / np.pi) if kind == "swivel" else ("mm", 1e3)
             noise, varies = (factor * np.sqrt(total / count) for total in (left, given))
-            out.append(
+            yield (
                 f"the {_WORDS[kind]} do not follow the geometry: they vary by {varies:.3g} {unit} "
                 f"and differ from it by {noise:.3g} {unit} rms beside their zeros; check "
                 f"{_CAUSES[kind]}"
             )
-    return out
 
 
 def _about_mean(values: Array) -> float:

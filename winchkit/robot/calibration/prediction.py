@@ -43,11 +43,8 @@ class PoseErrors:
 def errors_at(
     equations: RobotEquations, values: Array, predicted: Pose | None = None
 ) -> PoseErrors:
-    """Predict every pose from its motor angles, and compare it with the measured one.
-
-    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
-    ``predicted``: (p,), by the machine's numbers among `values`, where it is known already.
-    """
+    """Predict every pose from its motor angles, unless it is known already, and compare it with the
+    measured one."""
     found = predicted_poses(equations, values) if predicted is None else predicted
     unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
     measured = equations.measured
@@ -63,13 +60,8 @@ def errors_at(
 
 
 def cable_errors(equations: RobotEquations, values: Array, weights: Weights) -> Array:
-    """Cable lengths by drums against geometry, at the poses that all instruments determine.
-
-    The held-out error of a robot whose positions are not measured.
-
-    ``equations``: of the p poses. ``values`` (q,): parameters in fitted units. Returns (p, n): m;
-    NaN where a motor angle is missing.
-    """
+    """Cable lengths by drums against geometry, (p, n), m, at the poses that all instruments
+    determine: the held-out error of a robot whose positions are not measured."""
     # Kinds that were not fitted have unknown zeros and take no part.
     sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
     state = place(equations, BundleState(values, equations.start(values)), Weights(sigma))
@@ -77,12 +69,8 @@ def cable_errors(equations: RobotEquations, values: Array, weights: Weights) -> 
 
 
 def predicted_poses(equations: RobotEquations, values: Array, start: Pose | None = None) -> Pose:
-    """Forward kinematics of the motor angles, with strains by fixed-point iteration.
-
-    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
-    ``start``: by default at the measured poses. Returns: (p,); NaN where no pose was found. A
-    search that fails starts again from home.
-    """
+    """Forward kinematics of the motor angles from the measured poses, else ``start``, (p,); NaN
+    where none was found. Strains are found by fixed-point iteration."""
     robot = equations.robot_at(values)
     given = slack = equations.by_drum(values, robot)
     start = equations.start(values) if start is None else start
@@ -100,10 +88,8 @@ def predicted_poses(equations: RobotEquations, values: Array, start: Pose | None
 
 
 def _reading(equations: RobotEquations, values: Array, pose: Pose) -> Pose:
-    """Indications of the tracker at poses.
-
-    A session that was not fitted has an unknown frame, which is registered on its own poses.
-    """
+    """Indications of the tracker at poses; an unknown frame of a session that was not fitted is
+    registered on its own poses."""
     own = equations.instruments_at(values)
     if own is None:
         return pose

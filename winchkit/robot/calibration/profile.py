@@ -88,10 +88,8 @@ def write_calibrated(
 
 
 def _instruments(document: Any, found: Calibrated) -> None:
-    """Fitted numbers of the tracker; with the datum ``tracker`` the robot in the tracker's frame.
-
-    A frame of several sessions stays unknown: each session has its own.
-    """
+    """Fitted numbers of the tracker; with the datum ``tracker`` the robot in the tracker's frame. A
+    frame of several sessions stays unknown."""
     own = found.equations.instruments_at(found.values)
     if own is None or not own.free & set(NUMBERS):
         return

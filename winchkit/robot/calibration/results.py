@@ -70,11 +70,8 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
 
 
 def instruments_json(found: Calibrated) -> dict[str, Any]:
-    """Numbers of the tracker that were fitted, with the datum; empty where none were.
-
-    Returns: ``fitted``: names; ``undeclared``: those that the file does not declare unknown;
-    ``frames``: by session the pose of the base frame in the tracker's frame, SI; ``datum``.
-    """
+    """Numbers of the tracker that were fitted, the base frame's pose in its frame by session, and
+    the datum; empty where none were."""
     own = found.equations.instruments_at(found.values)
     if own is None or not own.free:
         return {}

@@ -147,7 +147,7 @@ class FitEnd:
     @property
     def is_plausible(self) -> bool:
         """Whether cables and geometry agree to within the prior of the exit points, with a
-        plausible scale of the tracker."""
+        plausible scale."""
         own = self.equations.instruments_at(self.solution.state.values)
         scale = own.trackers[0].scale if own is not None else 0.0
         closure = self.weights.sigma.get("closure", 0.0)
@@ -167,12 +167,8 @@ class FitEnd:
 def fitted_with_instruments(
     equations: RobotEquations, options: Options, progress: ProgressCallback
 ) -> tuple[RobotEquations, FitEnd]:
-    """Fit the declared model, or the one with the instruments and ratios that the poses require.
-
-    ``progress``: called with a line of progress. Returns: ``declared``: declared model at the
-    values from which its fit starts: what the file has, and the registration of what it declares
-    unknown.
-    """
+    """Fit the declared model, or the one with the instruments and ratios that the poses require;
+    also gives the declared one at the values from which its fit starts."""
     declared, best = _fitted_with_tracker(equations, options, progress)
     best = _recentred(best, options, progress)
     if (at_home := _with_home(equations, best, options, progress)) is not None:
@@ -199,10 +195,8 @@ def _with_home(
     equations: RobotEquations, best: FitEnd, options: Options, progress: ProgressCallback
 ) -> tuple[RobotEquations, FitEnd] | None:
     """The fit with the cable lengths at home free, where it explains the poses clearly better.
-
-    It is tried before a tracker is blamed that the file does not declare unknown, and where cables
-    and geometry disagree: lengths at home that are some millimetres off look like another frame.
-    """
+    Lengths some millimetres off look like another frame: it is tried before a tracker is blamed
+    that the file does not declare unknown, and where cables and geometry disagree."""
     blamed = best.free - _instruments(equations).free
     odd = best.weights.sigma.get("closure", 0.0) > _ODD * NOISE["closure"].start
     if "home_length" in equations.parameters.block or not (blamed or odd):
@@ -276,11 +270,9 @@ def _fitted_with_tracker(
 def _starting_at_home(
     equations: RobotEquations, own: InstrumentValues
 ) -> tuple[RobotEquations, float]:
-    """The equations with lengths at home by an adjustment, where the tracker's frame is known and
-    they are beyond their prior; and its misfit, m.
-
-    In a frame that is another one no lengths at home explain the positions: a fit would creep.
-    """
+    """The equations with lengths at home by an adjustment, where they are beyond their prior, and
+    its misfit, m. With an unknown frame no lengths at home explain the positions: a fit would
+    creep."""
     if "frame" in own.free:
         return equations, 0.0
     index = equations.parameters.block["home_length"]
@@ -293,10 +285,8 @@ def _starting_at_home(
 
 
 def _recentred(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
-    """The fit with the priors of the lengths at home about their estimates, where these left them.
-
-    A prior for a platform in its fixture says nothing of one that stood elsewhere.
-    """
+    """The fit with the priors of the lengths at home about their estimates, where these left them:
+    a prior for a platform in its fixture says nothing of one that stood elsewhere."""
     own = best.equations.parameters.block.get("home_length")
     for _ in range(_ROUNDS_AT_HOME if own is not None else 0):
         if np.all(np.abs(best.solution.linear.prior[own]) <= _BEYOND_PRIOR):
@@ -334,11 +324,8 @@ def _undeclared(equations: RobotEquations, own: InstrumentValues) -> list[str]:
 
 
 def _with_ratios(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
-    """The fit with the gear ratios of the lines whose winding radius left its prior.
-
-    A drum with layers distinguishes its ratio from its radius, so that the radius alone would be a
-    wrong model; on other drums the wider prior of the ratio takes the change.
-    """
+    """The fit with the gear ratios of the lines whose winding radius left its prior. A drum with
+    layers distinguishes the two; on others the wider prior of the ratio takes the change."""
     radius = best.equations.parameters.block["winding_radius"]
     prior, held = best.solution.linear.prior[radius], best.solution.held[radius]
     beyond = (np.abs(prior) > _BEYOND_PRIOR) | (held != 0)
@@ -407,11 +394,9 @@ def _nominal_error(equations: RobotEquations, predicted: Pose) -> float:
 
 
 def _shows_more(first: FitEnd, wider: RobotEquations) -> bool:
-    """Score test: whether one more free part of the tracker explains a significant part of χ².
-
-    The equations are linearised at the end of the fit with these numbers beside the parameters. The
-    step −(H + 1)⁻¹ g changes 2 cost by −gᵀ (H + 1)⁻¹ g; the prior's part of that is left out.
-    """
+    """Score test: whether one more free part of the tracker explains a significant part of χ². The
+    step −(H + 1)⁻¹ g at the end of the fit changes 2 cost by −gᵀ (H + 1)⁻¹ g; the prior's part of
+    that is left out."""
     from scipy.special import chdtri
 
     own = _instruments(first.equations)
@@ -449,10 +434,8 @@ def fitted(
     progress: ProgressCallback,
     from_fit: FitEnd | None = None,
 ) -> FitEnd:
-    """Fit and variance components in turn until both have settled.
-
-    A model that contains another one starts at the fit of that, so that it fits at least as well.
-    """
+    """Fit and variance components in turn until both have settled, from the end of a fit of fewer
+    parameters where there is one, so that it fits at least as well."""
     given = options.sigma or {}
     if from_fit is None:
         equations, state = started(equations, _sigma(equations, options))

@@ -2,10 +2,9 @@
 
 A cable that reaches its pulley from the other side leaves it on the other side, which is nearly the
 same as an exit point two pulley radii away: a fit imitates it by exit points, and is then wrong by
-tenths of a millimetre. The direction is one of two, so that both are fitted: all axes reversed, and
-each alone, with the standard deviations of the fit; the best one again with its own standard
-deviations. This is repeated from the best until no other one explains the poses better. A single
-reversed axis is no more evident than the geometry that imitates it: several are named together.
+tenths of a millimetre. All axes reversed, and each alone, are fitted with the standard deviations
+of the fit, the best one again with its own; this is repeated until no other one explains the poses
+better. A single reversed axis is no more evident than the geometry that imitates it.
 """
 
 from __future__ import annotations

@@ -119,10 +119,8 @@ class PoseSeries:
 
     @contextmanager
     def _kept(self) -> Iterator[Callable[[Run], None]]:
-        """Gives what writes the measured poses; raises UsageError where older ones would be lost.
-
-        Each pose is in its file as soon as it is measured.
-        """
+        """Gives what writes each pose as soon as it is measured; raises UsageError where older ones
+        would be lost."""
         from winchkit.runs.writer import write_run
 
         files = pose_names(self.output)

@@ -44,11 +44,8 @@ def record_robot(
     tell: Callable[[str], None],
     replace: bool = False,
 ) -> list[Path]:
-    """Run a robot programme on a simulated bench; returns its logs, one per repeat.
-
-    Raises UsageError for a bench without a robot, and for logs that exist and are not to be
-    replaced.
-    """
+    """Run a robot programme on a simulated bench; returns its logs, one per repeat. Raises
+    UsageError for a bench without a robot, and for logs that are not to be replaced."""
     from winchkit.errors import UsageError
     from winchkit.robot.bench.programme import run_robot_programme
 

@@ -167,8 +167,6 @@ def _demanded(
 
 def _box(robot: Robot, start: str | None, end: str | None) -> Any:
     """Corners of the box, m; the default where neither is given."""
-    import numpy as np
-
     from winchkit.cli.bench.pose_option import read_pose
     from winchkit.robot.workspace.workspace import usual_box
 
@@ -178,7 +176,7 @@ def _box(robot: Robot, start: str | None, end: str | None) -> Any:
             if name not in {"x", "y", "z"}:
                 raise UsageError(f"'{text}': the box has x, y and z; rotations are --turn")
             corner["xyz".index(name)] = value
-    return tuple(np.asarray(corner) for corner in corners)
+    return tuple(corners)
 
 
 def _unit(grid: Grid, *, sliced: bool = False) -> str:

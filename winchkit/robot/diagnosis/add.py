@@ -43,10 +43,8 @@ def fitted_addition(
     catalogue: Catalogue | None = None,
 ) -> FittedRobotAddition:
     """Fit ``EFFECT`` or ``EFFECT/LINE`` beside the profile's own, with the geometry of the file.
-
-    Raises UsageError for an effect that is unknown, present already, at no such place, or that the
-    poses cannot show; RunError with every fault of every run.
-    """
+    Raises UsageError for one that is unknown, present already, at no such place or not visible, and
+    RunError."""
     require_types(runs, Run, "runs")
     require_type(profile, RobotProfile, "profile")
     catalogue = catalogue or load_catalogue()

@@ -1,9 +1,7 @@
 """Joint estimate of poses, geometry and a profile's own effects by the solver of the calibration.
 
-The parameters are the numbers of the geometry, with the priors of the diagnosis and without bounds,
-the coordinates of effects, and the zeros of swivel angles and length instruments about their mean
-readings. :func:`winchkit.robot.identification.bundle_adjustment.solve` eliminates the poses by a
-Schur complement. The regression problem (:mod:`winchkit.robot.diagnosis.regression`) eliminates
+The geometry has the priors of the diagnosis and no bounds. The solver eliminates the poses by a
+Schur complement; the regression problem (:mod:`winchkit.robot.diagnosis.regression`) eliminates
 them at the solution by an orthonormal basis, which gives the same normal equations and independent
 rows, as tests need.
 """
@@ -104,11 +102,8 @@ def free_geometry(parameters: Parameters, lines: Sequence[str]) -> tuple[Geometr
 def geometry_parameters(
     dataset: RobotDataset, stated: Mapping[str, str] | None = None
 ) -> Parameters:
-    """Parameters of the geometry, without bounds, and the zeros of instruments.
-
-    ``stated``: standard deviations by number, without which one is held; by default the priors of
-    a calibration.
-    """
+    """Parameters of the geometry, without bounds, and the zeros of instruments; the standard
+    deviations are ``stated``, zero for the others, else those of a calibration."""
     robot = robot_of(replace(dataset.robot, effect=()))
     parameters = parameters_of(robot, dataset.measured)
     everything = []

@@ -64,10 +64,8 @@ class RobotDataset(Dataset):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Outputs: cable lengths, and tensions where they are compared with the weight.
-
-        The statics of a hanging platform determine its pose and are among the rows of the lengths.
-        """
+        """Outputs: cable lengths, and tensions where they are compared with the weight. The statics
+        of a hanging platform determine its pose and are among the rows of the lengths."""
         return self.shown_outputs if not self.hangs else ("cable_length",)
 
     @property
@@ -107,11 +105,8 @@ class RobotDataset(Dataset):
 
 
 def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
-    """Read the poses of a robot's runs, or the samples of its logs in motion.
-
-    Raises RunError with every fault of every run; for fewer than ten poses, or without redundancy
-    beyond the six coordinates of each pose.
-    """
+    """Read the poses of a robot's runs, or the samples of its logs in motion. Raises RunError with
+    every fault; for fewer than ten poses, or no redundancy beyond the coordinates of each pose."""
     require_types(runs, Run, "runs")
     require_type(robot, RobotProfile, "profile")
     if not runs:

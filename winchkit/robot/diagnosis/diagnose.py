@@ -218,11 +218,9 @@ class RobotSelection:
 
     @property
     def rest(self) -> tuple[PoseRegression, Errors]:
-        """Model and errors in which to look for a pattern of the unexplained residual.
-
-        With the geometry of the file, unless that is far off: a free geometry that explains little
-        has been fitted to the missing effect.
-        """
+        """Model and errors in which to look for a pattern of the unexplained residual: with the
+        geometry of the file, unless that is far off, since a free geometry that explains little has
+        been fitted to the missing effect."""
         before, after = self.errors
         ratios = [rms(name, after[name]) / rms(name, before[name]) for name in after]
         if self.geometry_is_free and (min(ratios) > _LEAST_FALL or max(ratios) > _LARGEST_RATIO):

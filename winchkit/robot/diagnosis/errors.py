@@ -178,20 +178,15 @@ def output_fits_of(
 
 
 def errors_in_noise(model: FittedModel) -> dict[str, float]:
-    """Held-out rms of the whitened equations by output, in standard deviations of white noise.
-
-    Every measured coordinate has the weight of its variance component: in an error in metres the
-    least accurate angle hides what a tracker sees.
-    """
+    """Held-out rms of the whitened equations by output, in standard deviations of white noise: in
+    an error in metres the least accurate angle hides what a tracker sees."""
     return held_out_rows(model.regression, model.fit, model.noise, model.regression.groups)
 
 
 def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
-    """Noise by output that decides on a model, in the unit of :func:`errors_in_noise`.
-
-    Two standard errors above that of the repeats, which a few poses determine to some 10 %. Without
-    repeats what is beyond the noise of usual instruments may be an effect, and does not count.
-    """
+    """Noise by output that decides on a model, in the unit of :func:`errors_in_noise`: two standard
+    errors above that of the repeats, which a few poses determine to some 10 %. Without repeats what
+    is beyond the noise of usual instruments may be an effect, and does not count."""
     regression, beyond = model.regression, model.noise.uncertainty(model.regression)
     here, out = regression.residuals(()), {}
     for output, size in model.noise.rms.items():
@@ -295,10 +290,7 @@ def _held_out(model: FittedModel) -> Errors:
 
 
 def _slope(regression: PoseRegression) -> Array:
-    """Derivatives of the lengths by the observed point and the rotation, (p, n, 6).
-
-    The platform's origin is c = u − R o with the observed point u and its place o on the platform.
-    """
+    """Derivatives of the lengths by the observed point u = c + R o and the rotation, (p, n, 6)."""
     by, tracker = regression.slope["closure"], regression.tracker
     if tracker is None or not np.any(tracker.offset):
         return by

@@ -132,10 +132,8 @@ def plan(answer: RobotAnswer, count: int = POSES) -> PosePlan:
 
 
 def _hidden(answer: RobotAnswer) -> tuple[Term, ...]:
-    """Effects that are not detectable in their usual size, the most nearly detectable first.
-
-    Of effects on one line each, the line with the least power.
-    """
+    """Effects not detectable in their usual size, the most nearly detectable first; of effects on
+    one line each, the line with the least power."""
     undetectable: dict[str, tuple[float, Term]] = {}
     there = {term.effect.id for term in answer.result.final.hypothesis.terms}
     for score in answer.result.scores:

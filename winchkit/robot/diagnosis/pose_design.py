@@ -176,11 +176,8 @@ class PoseOffer:
 def next_pose_runs(
     regression: PoseRegression, final: Hypothesis, pairs: Sequence[tuple[Term, Term]]
 ) -> tuple[NextRun, ...]:
-    """Kinds of poses that separate pairs of effects.
-
-    Returns: per pair the first kind with a power of 90 %, else the two best above 20 %; else the
-    advice of the effects' cards, with a power of NaN.
-    """
+    """Per pair of effects the first kind of poses that separates it with a power of 90 %, else the
+    two best above 20 %; else the advice of the effects' cards, with a power of NaN."""
     out: list[NextRun] = []
     for first, second in pairs:
         offers = pose_offers(regression, final, [(first, second)], [SEPARATED_AT])
@@ -202,11 +199,8 @@ def pose_offers(
     required: Sequence[float],
     count: int = POSES,
 ) -> list[PoseOffer]:
-    """Choose poses of every kind for a set of questions.
-
-    ``required``: χ² at which each question counts as answered. ``count``: poses per offer. Returns:
-    in ascending order of effort.
-    """
+    """Choose poses of every kind for a set of questions, each answered at its ``required`` χ², in
+    ascending order of effort."""
     robot = regression.point.robot(final.terms)
     kinds = [kind for kind in POSE_CANDIDATES if usable(kind, regression.dataset)]
     simulated = [(kind, *simulated_poses(regression, robot, kind)) for kind in kinds]
@@ -260,11 +254,8 @@ def _words(offer: PoseOffer) -> str:
 def _with_all(
     regression: PoseRegression, simulated: Sequence[tuple[PoseCandidates, MeasuredPoses, Pose]]
 ) -> PoseRegression:
-    """Regression of the poses so far and all simulated ones.
-
-    Samples of a trajectory count as poses at rest: what they show of inertia or a delay is no part
-    of a question about poses.
-    """
+    """Regression of the poses so far and all simulated ones; samples of a trajectory count as poses
+    at rest: what they show of inertia or a delay is no part of a question about poses."""
     point, dataset = regression.point, regression.dataset
     poses = [point.pose, *(pose for _, _, pose in simulated)]
     measured = joined([dataset.measured, *(own for _, own, _ in simulated)])
@@ -279,10 +270,8 @@ def _with_all(
 
 
 def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:
-    """Information of an effect's column, its rival's and the nuisances', (poses + 1, k, k).
-
-    The effect's column is the first; the last matrix is that of the prior.
-    """
+    """Information of an effect's column, which is the first, its rival's and the nuisances', (poses
+    + 1, k, k); the last matrix is that of the prior."""
     first, second = question
     in_question = {term.effect.id for term in question if term is not None}
     others = Hypothesis()

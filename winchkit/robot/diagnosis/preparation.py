@@ -6,7 +6,7 @@ so that the model is linearised at its best fit. The noise is estimated by varia
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -85,12 +85,9 @@ def estimated_noise(
 
 
 def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
-    """Whether the imbalance of the tensions is below 20 % of their standard deviation.
-
-    The imbalance is what no payload explains, nor the effect that explains most. Else an
-    unmodelled force acts on the platform, or the load cells do not measure these cables: the
-    balance is then left out, with a note.
-    """
+    """Whether the imbalance of the tensions that no payload explains, nor the effect that explains
+    most, is below 20 % of their standard deviation. Else an unmodelled force acts on the platform,
+    or the load cells do not measure these cables."""
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
@@ -204,11 +201,8 @@ class Preparation:
         return chi_square[0] - chi_square[1]
 
     def geometry_is_significant(self, gain: float) -> bool:
-        """F test of the decrease of χ² by the geometry.
-
-        F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level
-        0.1 %.
-        """
+        """F test, level 0.1 %, of the decrease of χ² by the k numbers of the geometry: F =
+        Δχ²/k."""
         count, dof = (
             int(np.count_nonzero(self.prior.lasting)),
             self.noise.dof.get("cable_length", 1.0),
@@ -216,11 +210,8 @@ class Preparation:
         return gain / count > float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
 
     def with_guess(self) -> Preparation:
-        """The same with the effect that explains most beside a free geometry, and its noise.
-
-        A geometry fitted without the missing effect may be millimetres off, too far for a linear
-        model.
-        """
+        """The same with the effect that explains most beside a free geometry, and its noise: a
+        geometry fitted without it may be millimetres off, too far for a linear model."""
         engine = self.free_geometry()
         present, noise = engine.fit_with_noise(engine.initial_model)
         listed = [s for s in engine.scores(present, noise) if s.net_gain > 0][:_SHORT_LIST]
@@ -237,11 +228,8 @@ class Preparation:
 def prepare_selection(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue
 ) -> Preparation:
-    """Read poses, estimate their noise and collect the candidates.
-
-    Raises RunError with every fault of every run, and with the mistakes in its poses; FileError for
-    effects that do not bind.
-    """
+    """Read poses, estimate their noise and collect the candidates. Raises RunError with every fault
+    and mistake of the runs; FileError for effects that do not bind."""
     dataset = prepare_poses(runs, profile)
     if not dataset.moves:
         refuse_mistakes(robot_of(profile), dataset.measured)
@@ -274,47 +262,43 @@ _LEAST_POSES = 40
 """Distinct poses below which a note asks for more; rule of thumb."""
 
 
-def missing_pose_excitation(preparation: Preparation) -> list[str]:
+def missing_pose_excitation(preparation: Preparation) -> Iterator[str]:
     """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
     dataset, measured = preparation.dataset, preparation.dataset.measured
-    notes = []
     if dataset.moves:
-        notes.append(
+        yield (
             "a trajectory has no repeats: the noise is what neither geometry nor any known effect "
             "explains, so an effect outside the catalogue cannot be excluded; record poses at "
             "rest, some ten of them twice"
         )
     elif not preparation.noise.from_repeats:
-        notes.append(
+        yield (
             "too few poses repeat another: the noise is what neither geometry nor any known effect "
             "explains, so an effect outside the catalogue cannot be excluded; drive to some ten "
             "poses twice"
         )
     if not dataset.has_tension:
-        notes.append(
+        yield (
             "no tensions measured: what depends on the cables' force (elasticity, payload, cells) "
             "cannot be seen; record LINE.tension [N]"
         )
     elif not dataset.has_balance:
-        notes.append(
+        yield (
             "the tensions measured do not carry the platform's weight, whatever it is: payload and "
             "cells cannot be judged; does something else pull at the platform?"
         )
     if not np.isfinite(measured.temperature).all():
-        notes.append("no temperature measured: thermal effects cannot be detected")
+        yield "no temperature measured: thermal effects cannot be detected"
     if not np.isfinite(measured.position).any():
-        notes.append("no position measured: the origin of the platform frame cannot be determined")
+        yield "no position measured: the origin of the platform frame cannot be determined"
     whole = measured.angles[np.isfinite(measured.angles).all(axis=1)]
     if len(whole):
         turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
         if float(np.max(np.linalg.norm(turned, axis=1))) < _LEAST_ROTATION:
-            notes.append(
+            yield (
                 "the platform never turned: exit and anchor points cannot be distinguished; "
                 "turn it between poses"
             )
     distinct = int(dataset.pose.max()) + 1
     if distinct < _LEAST_POSES:
-        notes.append(
-            f"{distinct} distinct poses only; ninety, widely spread, are much more informative"
-        )
-    return notes
+        yield f"{distinct} distinct poses only; ninety, widely spread, are much more informative"

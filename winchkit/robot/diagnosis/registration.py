@@ -2,10 +2,9 @@
 
 The selection compares effects in a linearised model, to which a frame that is turned by tens of
 degrees, or a reflector far from the origin, is no small change. Such readings are first registered
-in closed form on the poses by the motor angles
-(:mod:`winchkit.robot.geometry.tracker`); frame and offset are then effects of the
-initial model, fitted beside everything else, and reported as the first missing effects. Numbers
-that the robot's file declares unknown start in the same way, and are not reported.
+in closed form; frame and offset are then effects of the initial model, fitted beside everything
+else, and reported as the first missing effects. Numbers that the robot's file declares unknown
+start in the same way, and are not reported.
 """
 
 from __future__ import annotations

@@ -332,10 +332,8 @@ class PoseRegression(Regression):
         ]
 
     def _nuisances(self) -> Array:
-        """Columns of the instruments' zero offsets, then of the geometry.
-
-        The unit of a geometry column is one standard deviation of its prior.
-        """
+        """Columns of the instruments' zero offsets, then of the geometry in standard deviations of
+        its prior."""
         columns = []
         for kind in self._zeros:
             for i in range(len(self.dataset.names)):
@@ -352,11 +350,8 @@ class PoseRegression(Regression):
         return np.array(columns).reshape(len(columns), self.n_rows).T
 
     def change_by_geometry(self) -> list[dict[str, Array]]:
-        """Change of the residuals by one standard deviation of each number of the geometry.
-
-        Linear in the number; its influence on the forces is neglected and updated with the
-        linearisation point.
-        """
+        """Change of the residuals by one standard deviation of each number of the geometry; its
+        influence on the forces is updated with the linearisation point."""
         nothing = {kind: np.zeros_like(values) for kind, values in self._start.items()}
         by_values = {
             rows.kind: rows.by_values * self.equations.parameters.std
@@ -370,10 +365,8 @@ class PoseRegression(Regression):
 
 
 def continuous(basis: Array) -> Array:
-    """Rotations (p, k, k) of the columns of orthonormal bases that make them continuous in time.
-
-    Each basis (p, m, k) is turned within its subspace to be nearest to that of the middle sample
-    (orthogonal Procrustes problem), so that the rows of a trajectory have a spectrum.
-    """
+    """Rotations (p, k, k) that turn each basis (p, m, k) within its subspace to be nearest to that
+    of the middle sample (orthogonal Procrustes problem), so that the rows of a trajectory have a
+    spectrum."""
     left, _, right = np.linalg.svd(np.swapaxes(basis, 1, 2) @ basis[len(basis) // 2])
     return np.asarray(left @ right)

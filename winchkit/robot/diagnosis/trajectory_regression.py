@@ -1,10 +1,9 @@
 """Regression problem of a robot's trajectory: spectral coefficients of the equations over time.
 
-The equations are those of poses (:class:`.PoseRegression`), with the pose of every sample projected
-out. Their residuals in consecutive samples are correlated: rows
-are their discrete cosine transform over each run, whose variance is estimated by frequency band, as
-for the runs of a winch. The projected equations have a continuous basis, so that they have a
-spectrum. Folds are contiguous stretches of time.
+The equations are those of poses, but residuals in consecutive samples are correlated: rows are
+their discrete cosine transform over each run, whose variance is estimated by frequency band. The
+projected equations have a continuous basis, so that they have a spectrum. Folds are contiguous
+stretches of time.
 """
 
 from __future__ import annotations
@@ -31,10 +30,7 @@ _GROUPS = 5
 
 
 class TrajectoryRegression(PoseRegression):
-    """Regression of a robot's trajectory on the effects of a hypothesis.
-
-    Initial states of effects with memory are zero at the start of each run.
-    """
+    """Regression of a robot's trajectory; effects with memory start each run at zero."""
 
     @property
     def trajectory(self) -> SampledMotion:

@@ -1,9 +1,4 @@
-"""Kinematics of a robot in a control cycle: one pose at a time, without numpy's overhead.
-
-cycle = RobotCycle(robot, kernels=fastest())
-angles = cycle.motor_angles(pose)          # twelve floats: position, then rotation by rows
-there = cycle.pose_at(measured_lengths)    # warm-started from the last one
-"""
+"""Kinematics of a robot in a control cycle: one pose at a time, without numpy's overhead."""
 
 from __future__ import annotations
 

@@ -8,18 +8,11 @@ acceleration α:
     Aᵀ f + w = 0,      w = [m g − m a_c;  c × (m g − m a_c) − I α − ω × I ω]
 
 The wrench w of weight and inertial forces takes the place of the weight in every equation of the
-balance at rest, so that force distribution and elongation correction use it unchanged. Solved for
-the acceleration it is the forward dynamics, M [a; α] + h = Aᵀ f + w_g.
+balance at rest, so that force distribution and elongation correction use it unchanged.
 
-    motion = motion_of(time, pose)                        # from sampled poses
-    found = inverse_dynamics(robot, time, motion, ForceLimits(60.0, 800.0))
-    found.motor_torque                                    # feed-forward, (k, n)
-
-Notes
------
 Cables are straight and without mass: the sag of a cable of length l, mass per length μ and
-horizontal span h under the force f shortens its chord by (μ g h)² l / (24 f²) (parabola), which
-:func:`sag` computes; compare it with the accuracy that is wanted.
+horizontal span h under the force f shortens its chord by (μ g h)² l / (24 f²) (parabola); compare
+it with the accuracy that is wanted.
 
 References
 ----------
@@ -42,7 +35,6 @@ from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec
-from winchkit.units import GRAVITY
 
 _FEWEST = 4
 """A cubic spline with third derivatives continuous at the second and last but one pose (not-a-knot)
@@ -152,13 +144,9 @@ def dynamic_wrench(platform: PlatformSpec, motion: PlatformMotion) -> Array:
 
 
 def accelerations(platform: PlatformSpec, rotation: Array, velocity: Array, wrench: Array) -> Array:
-    """Forward dynamics: acceleration of the platform under a wrench beside its weight.
-
-    ``rotation`` (k, 3, 3): from platform to base axes. ``velocity`` (k, 6): of the origin, and
-    angular, base axes, m/s and rad/s. ``wrench`` (k, 6): on the platform about its origin, N and N
-    m: Aᵀ f of cable forces. Returns (k, 6): m/s² and rad/s². Raises UsageError without a mass or a
-    moment of inertia.
-    """
+    """Forward dynamics: acceleration (k, 6) of the platform with a velocity (k, 6), in base axes,
+    under a wrench Aᵀ f (k, 6) beside its weight. Raises UsageError without a mass or a moment of
+    inertia."""
     if platform.mass <= 0 or platform.inertia is None or min(platform.inertia) <= 0:
         raise UsageError(
             "the forward dynamics needs [platform] mass and inertia, each above 0; write the three "
@@ -204,16 +192,6 @@ def inverse_dynamics(
         torque[:, i] = line.predict(line.motion(signals))["motor_torque"]
     angle[~known], torque[~known] = np.nan, np.nan
     return InverseDynamics(wrench, force, angle, torque)
-
-
-def sag(length: Array, span: Array, force: Array, mass_per_length: float) -> Array:
-    """Difference of a sagging cable's length and its chord, m.
-
-    ``length``: of the chord, m. ``span``: its horizontal projection, m. ``force``: along the chord,
-    N. ``mass_per_length``: kg/m. Returns: (μ g h)² l / (24 f²), the parabola. For a level cable the
-    next term of the catenary is (μ g l / f)² / 80 of it.
-    """
-    return np.asarray((mass_per_length * GRAVITY * span) ** 2 * length / (24 * force**2))
 
 
 def _inertia(platform: PlatformSpec, rotation: Array) -> Array:

@@ -1,9 +1,4 @@
-"""Inverse dynamics of a robot in a control cycle: cable forces, motor angles and torques per tick.
-
-cycle = DynamicsCycle(robot, initial, period=1e-3, kernels=fastest())
-target = cycle.update(pose, velocity, acceleration)    # 12, 6 and 6 floats
-target.motor_angle, target.motor_torque                # commands
-"""
+"""Inverse dynamics of a robot in a control cycle: forces, motor angles and torques per tick."""
 
 from __future__ import annotations
 

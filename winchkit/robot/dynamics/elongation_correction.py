@@ -4,11 +4,6 @@ Scheme of Fig. 1 of the IPAnema paper: cable forces are estimated from the pose 
 sign corrected), strains from the forces (Eq. 4, 5 or 6), and the commanded cable length is reduced
 by the elongation. All is relative to a reference pose, at which motors and platform were
 referenced, so that the correction is zero there.
-
-    correction = ElongationCorrection.of(robot, middle_force=500.0)
-    stretch = correction.update(pose)                  # twelve floats, at 1 kHz
-    angles = cycle.motor_angles(pose, stretch.strain)  # φ_IK, less the elongation
-    found = cycle.pose_at([l + d for l, d in zip(drum_lengths, stretch.length)])    # φ_FK
 """
 
 from __future__ import annotations

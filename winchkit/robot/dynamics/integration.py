@@ -61,13 +61,8 @@ def cable_forces(
     *,
     rate: Array | float = 0.0,
 ) -> Array:
-    """Forces of elastic cables, (p, n), N; zero where slack.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``velocity`` (p, 6): of the platform's
-    origin, and angular, m/s and rad/s. ``unstrained`` (n,) or (p, n): lengths L0 without force, m.
-    ``rate`` (n,) or (p, n): their derivatives by time, m/s; zero for winches at rest. Returns
-    (p, n): N.
-    """
+    """Forces of elastic cables, (p, n), N, zero where slack, at lengths without force (n,) or (p,
+    n), m, and their rates, m/s."""
     there = lengths(geometry, pose.position, pose.rotation)
     stiffness = cables.axial_stiffness / (unstrained + cables.dead_length)
     pull = stiffness * (there - unstrained)
@@ -89,15 +84,10 @@ def integrate(
     time: Array,
     tolerance: float = 1e-8,
 ) -> SimulatedPlatform:
-    """Integrate the platform's motion; the result has the k instants of ``time``.
-
-    ``start``: one pose, and its velocity (6,): of the origin, m/s, and angular, rad/s, base axes.
-    ``unstrained``: lengths (n,) without force at a time, m: of a robot
-    ``robot.lengths_at(angles)[0]``. ``rate``: their derivatives (n,) by time, m/s, which the
-    damping needs; None for winches at rest. ``time`` (k,): increasing from the start's, s.
-    ``tolerance``: relative error of a step; absolute in m, rad, m/s and rad/s. Raises UsageError
-    without mass or moment of inertia, or where the integration does not reach the end.
-    """
+    """Integrate the platform's motion from one pose and its velocity (6,); the result has the k
+    instants of ``time``. ``unstrained`` lengths (n,) at a time, m, are those of
+    ``robot.lengths_at``, their ``rate`` is for the damping. Raises UsageError without mass or
+    moment of inertia, or where the integration does not reach the end."""
     from scipy.integrate import solve_ivp
 
     pose, velocity = start

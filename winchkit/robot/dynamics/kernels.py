@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from typing import Any
 
-from winchkit.errors import UsageError
+from winchkit.estimation.kernels import float_array, jit_of
 from winchkit.robot.dynamics.loops_dynamics import winches_loop, wrench
 from winchkit.robot.geometry.loops import CableLine, cables_loop, motors_loop, wound_angle
 from winchkit.robot.geometry.loops_pose import (
@@ -83,24 +83,15 @@ def compiled() -> RobotKernels:
     UsageError
         Where numba is not installed (``pip install 'winchkit[fast]'``).
     """
-    try:
-        from numba import njit
-    except ImportError:
-        raise UsageError(
-            "numba is not installed, which compiles the loops; pip install 'winchkit[fast]', "
-            "or use plain Python with winchkit.robot.PLAIN"
-        ) from None
     import numpy as np
 
+    jit = jit_of("winchkit.robot.PLAIN")
     record = np.dtype([(field.name, np.float64) for field in fields(CableLine)])
-
-    def array(values: list[float]) -> Any:
-        return np.array(values, dtype=np.float64)
 
     def lines(cables: list[CableLine]) -> Any:
         return np.array([astuple(cable) for cable in cables], dtype=record)
 
-    built = _build("numba", njit, array, lines)
+    built = _build("numba", jit, float_array, lines)
     _warm_up(built)
     return built
 

@@ -59,10 +59,8 @@ def winches_loop(wound_angle: Function) -> Function:
         angles: Any,
         out: Any,
     ) -> None:
-        """Torques f r/i + J dφ'/dt; replaces the motor speeds ``rates`` of the last cycle.
-
-        With a period of zero, as in the first cycle, the inertia is left out.
-        """
+        """Torques f r/i + J dφ'/dt; replaces the motor speeds ``rates`` of the last cycle. A period
+        of zero, as in the first cycle, leaves the inertia out."""
         vx, vy, vz = velocity[0], velocity[1], velocity[2]
         ox, oy, oz = velocity[3], velocity[4], velocity[5]
         for i in range(len(lines)):

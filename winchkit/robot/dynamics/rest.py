@@ -29,7 +29,7 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.dynamics.dynamics import mass_matrix
 from winchkit.robot.geometry.hessian import length_hessian
-from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, lever_of, linearised
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_hessian
 from winchkit.units import GRAVITY
@@ -111,10 +111,8 @@ def rest_poses(robot: Robot, wanted: Pose) -> Rest:
 
 
 def _step(robot: Robot, pose: Pose, force: Array, weight: float) -> tuple[Array, Array]:
-    """Wrench that is left over as a share of the weight, (p,), and the step of Newton's method.
-
-    The step is a rotation vector and forces in weights, (p, 3 + n); NaN where a cable has no way.
-    """
+    """Wrench that is left over as a share of the weight, (p,), and the step of Newton's method, a
+    rotation vector and forces in weights, (p, 3 + n); NaN where a cable has no way."""
     count = force.shape[1]
     left, step = np.full(len(force), np.inf), np.full((len(force), 3 + count), np.nan)
     good = np.isfinite(lengths(robot.geometry, pose.position, pose.rotation)).all(axis=1)
@@ -176,11 +174,10 @@ def pendulum_modes(robot: Robot, pose: Pose, force: Array) -> tuple[Array, Array
 def _linear(robot: Robot, pose: Pose, force: Array) -> tuple[Array, Array]:
     """Derivatives of the lengths (p, n, 6), and of the balance (p, 6, 6), by the pose."""
     _, by = linearised(robot.geometry, pose.position, pose.rotation)
-    slope = np.concatenate([by.position, by.rotation], axis=-1)
     bend = weight_hessian(robot.platform, pose.rotation) + np.einsum(
         "pn,pnij->pij", force, length_hessian(robot.geometry, pose.position, pose.rotation)
     )
-    return slope, bend
+    return by_pose(by), bend
 
 
 def _reduced(
@@ -199,5 +196,5 @@ def _reduced(
 
 def _scale(robot: Robot) -> Array:
     """One for forces, and the reciprocal of the anchors' distance for moments, (6,)."""
-    lever = float(np.sqrt(np.mean(np.sum(robot.geometry.anchor_point**2, axis=1))))
+    lever = lever_of(robot.geometry)
     return np.repeat([1.0, 1.0 / lever if lever > 0 else 1.0], 3)

@@ -69,11 +69,8 @@ def standard_poses(delay: float = 0.0) -> Pose:
 
 
 def robot_changes(effect: Effect, values: dict[str, float]) -> tuple[Array, dict[str, Array]]:
-    """Length of line 1 along the standard poses, and its changes by an effect, (p,), SI.
-
-    The change of a length is that of the length by the drum less that by geometry. The change of a
-    tension is that of the forces that balance the weight and are nearest to 40 N.
-    """
+    """Length of line 1 along the standard poses, and its changes by an effect, (p,), SI: that by
+    the drum less that by geometry, and the forces nearest to 40 N that balance the weight."""
     there = at_line(effect, "1") if "one" in effect.on_robot else effect
     bare = _shown(_bare())
     changed = _shown(robot_with_terms(STANDARD_ROBOT, [Term(there, values)]))

@@ -163,10 +163,8 @@ and a pose that can be controlled 1e-6."""
 
 
 def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[str]]:
-    """The header of a robot, and what it lacks.
-
-    Raises UsageError as :func:`~winchkit.dynamics.step.step_of`.
-    """
+    """The header of a robot, and what it lacks; UsageError as
+    :func:`~winchkit.dynamics.step.step_of`."""
     p, place = identifier(robot.profile.name), robot.geometry
     rows = np.flatnonzero(place.free).tolist()
     numbers = np.hstack(

@@ -50,11 +50,8 @@ _THIRD = sqrt(20.0)
 
 
 def holds_of(angle: Array) -> list[slice] | None:
-    """Stretches at rest of all winches.
-
-    ``angle`` (p, n): motor angles of n lines in the order of time, rad; NaN where missing. Returns:
-    None where the rows are no log, but a pose each.
-    """
+    """Stretches at rest of all winches by motor angles (p, n) in the order of time; None where the
+    rows are no log, but a pose each."""
     found = _tolerance(angle)
     if found is None:
         return None
@@ -100,10 +97,8 @@ def _tolerance(angle: Array) -> Array | None:
 
 
 def _swing(change: Array, most: float) -> float:
-    """Median swing of an angle at rest between two turning points, rad; zero where it has none.
-
-    A swing below ``most`` (rad) of one or two changes: those of a motion have more.
-    """
+    """Median swing below ``most`` of an angle at rest between two turning points, rad, zero where
+    it has none; those of a motion have more than two changes."""
     change = change[change != 0]
     if not len(change):
         return 0.0

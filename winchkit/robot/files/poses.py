@@ -154,11 +154,9 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> MeasuredPoses:
 
 
 def copies(poses: MeasuredPoses, of: MeasuredPoses | None = None) -> NDArray[np.bool_]:
-    """Rows that equal an earlier one, or one of other poses, in every number, (p,).
-
-    Two measurements of one pose differ by their noise: a copy measures nothing, and as a held-out
-    pose it would be one that was fitted.
-    """
+    """Rows that equal an earlier one, or one of other poses, in every number, (p,). Two
+    measurements of one pose differ by their noise: a copy, held out, would be a pose that was
+    fitted."""
     seen = set() if of is None else set(_numbers(of))
     out = np.zeros(len(poses), dtype=bool)
     for row, numbers in enumerate(_numbers(poses)):
@@ -188,12 +186,8 @@ def of_poses(mask: NDArray[np.bool_]) -> str:
 
 
 def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> MotionSamples | None:
-    """Rows of logs of a robot in motion.
-
-    Returns: None where the runs are poses: a row each, also along a path with a time of each, or
-    logs with at least ten holds that have a quarter of the rows. Raises RunError as
-    :func:`read_poses`.
-    """
+    """Rows of logs of a robot in motion; None where the runs are poses: a row each, also along a
+    path with a time of each, or logs with at least ten holds that have a quarter of the rows."""
     faults = [fault for run in runs for fault in _faults(run, profile)]
     if faults:
         raise RunError(faults)
@@ -376,17 +370,15 @@ def _partly(run: Run, profile: RobotProfile) -> list[str]:
     ]
 
 
-def _gaps(found: MeasuredPoses, moved: NDArray[np.bool_], profile: RobotProfile) -> list[str]:
-    notes = []
+def _gaps(found: MeasuredPoses, moved: NDArray[np.bool_], profile: RobotProfile) -> Iterator[str]:
     if left := int(np.count_nonzero(~moved)):
-        notes.append(f"{left} rows without any motor angle were left out")
+        yield f"{left} rows without any motor angle were left out"
     kept = found[moved]
     position = kept.position[:, ~held_unmeasured(kept, profile)]
     for name, values in (("motor_angle", kept.motor_angle), ("position", position)):
         missing = int(np.count_nonzero(np.isnan(values)))
         if 0 < missing < values.size:
-            notes.append(f"{missing} of {values.size} values of {name} are missing")
-    return notes
+            yield f"{missing} of {values.size} values of {name} are missing"
 
 
 def _temperature(run: Run, names: Sequence[str]) -> Array:

@@ -2,21 +2,17 @@
 
 ``force_basis`` whitens the balance (IPAnema paper, Eq. 7): the wrench Aᵀ f + w of measured cable
 forces f and weight w is multiplied by a matrix V with V Aᵀ A Vᵀ = 1, so that each row has the
-variance of one force reading. With the mass m and the centre of mass s of the platform
-
-    ∂w/∂m = [g; (R s) × g]                   ∂w/∂s_k = [0; R e_k × m g]
-
-The derivatives of V Aᵀ by pose and geometry are left out: the wrench that is left over is small.
+variance of one force reading. The derivatives of V Aᵀ by pose and geometry are left out: the wrench
+that is left over is small.
 
 ``hanging_balance``. A platform on fewer cables than degrees of freedom stands where their forces
-balance its weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of
-the weight, six equations
+balance its weight:
 
     S (Aᵀ f + w) = 0,      S = diag(1, 1, 1, 1/ρ, 1/ρ, 1/ρ)
 
 with the rms distance ρ of the anchor points from the platform's origin, so that all rows are
-forces. They determine the tilt that the cables leave free, so that their derivatives by pose, exit
-and anchor points and swivel radii are needed: central differences of 1 µm and 1 µrad.
+forces. They determine the tilt that the cables leave free, so that their derivatives by pose and
+geometry are needed: central differences of 1 µm and 1 µrad.
 
 References
 ----------
@@ -31,7 +27,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.robot.geometry.constraints import Constraint
-from winchkit.robot.geometry.kinematics import Geometry, Pose, structure_matrix
+from winchkit.robot.geometry.kinematics import Geometry, Pose, lever_of, structure_matrix
 from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
@@ -46,22 +42,14 @@ below 1e-9 of a force. Also the least lever arm of a platform's anchor points, m
 
 
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
-    """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
-
-    ``structure`` (p, 6, n): structure matrices Aᵀ. ``tension`` (p, n): cable forces f, N.
-    ``weight`` (p, 6): wrench w of the weight, N and N m. Returns (p, 6): N and N m.
-    """
+    """Wrench Aᵀ f + w that cable forces (p, n) and weight (p, 6) leave over, (p, 6), N and N m."""
     return np.asarray((structure @ tension[..., None])[..., 0] + weight)
 
 
 def force_basis(structure: Array) -> tuple[Array, Array]:
-    """Matrices from a wrench to whitened forces, and from these to cable forces.
-
-    ``structure`` (p, 6, n): structure matrices Aᵀ = U S Wᵀ (singular value decomposition). Returns:
-    ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n). A row is NaN where the cables cannot
-    carry its wrench, so that hanging and guided platforms keep the rows that they do carry.
-    ``to_cables`` (p, n, k): W: the least change of cable forces that carries each of these forces.
-    """
+    """Matrices V = S⁻¹ Uᵀ (p, k, 6) from a wrench to whitened forces, and W (p, n, k) to the least
+    change of cable forces that carries them, of Aᵀ = U S Wᵀ. A row is NaN where the cables cannot
+    carry its wrench, so that hanging and guided platforms keep the rows that they do carry."""
     good = np.all(np.isfinite(structure), axis=(1, 2))
     left, size, right = np.linalg.svd(
         np.where(good[:, None, None], structure, 0.0), full_matrices=False
@@ -79,11 +67,7 @@ def hanging_residual(
     platform: PlatformSpec,
     inertial: Array | float = 0.0,
 ) -> Array:
-    """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): cable forces, N;
-    NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at rest.
-    """
+    """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N."""
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     weight = gravity_wrench(platform, pose.rotation) + inertial
     return wrench_scale(geometry) * wrench_residual(structure, tension, weight)
@@ -91,8 +75,7 @@ def hanging_residual(
 
 def wrench_scale(geometry: Geometry) -> Array:
     """Diagonal of S, (6,)."""
-    lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
-    return np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
+    return np.repeat([1.0, 1.0 / max(lever_of(geometry), _STEP)], 3)
 
 
 def hanging_balance(
@@ -102,13 +85,8 @@ def hanging_balance(
     platform: PlatformSpec,
     inertial: Array | float = 0.0,
 ) -> Constraint:
-    """Wrench of measured cable forces and weight, (p, 6), N.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
-    forces, N; NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at
-    rest. Returns: ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point``
-    and ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
-    """
+    """Wrench of measured cable forces (p, n), of the weight and of the inertial forces (p, 6), by
+    pose, payload, cable forces and the geometry of all lines; (p, 6), N."""
     scale = wrench_scale(geometry)
 
     def pulls(own: Geometry, at: Pose) -> Array:

@@ -21,13 +21,8 @@ _LEAST_SLOPE = 0.1
 
 
 def strain_of(law: str, values: Array, tension: Array) -> tuple[Array, Array]:
-    """Strain at tensions, and its derivatives by the law's parameters.
-
-    ``law``: ``cable-elongation-linear``, ``-quartic`` or ``-exponential``. ``values`` (m,): linear:
-    c, 1/N. Quartic: c, 1/N, b₂, b₃, b₄. Exponential: s, T₀, N. ``tension``: N, any shape; a slack
-    cable (negative tension) has no strain. Returns: ``strain``: of the shape of ``tension``;
-    ``by_values``: of the same shape with a last axis of m.
-    """
+    """Strain at tensions, N, zero of a slack cable, and its derivatives by the law's ``values``
+    (m,), in the last axis: c; c, b₂, b₃, b₄; or s, T₀."""
     force = np.maximum(tension, 0.0)
     if law == "cable-elongation-linear":
         return values[0] * force, force[..., None]

@@ -195,16 +195,9 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
 
 
 def preloaded(structure: Array, wrench: Array, limits: ForceLimits, preload: Array) -> Forces:
-    """Solution with wanted forces in some cables, changed least from :func:`quadratic`.
-
-    ``preload`` (n,): wanted forces, N; NaN in the other cables. More than balance each other are
-    met with the least sum of squares. Returns: also forces beyond the limits; NaN where none within
-    the limits balance the wrench. Other parameters as of :func:`closed_form`.
-
-    Notes
-    -----
-    f = f_0 + N (N_k)⁺ (p − f_0)_k with the rows k of the null space N that are wanted.
-    """
+    """Solution f₀ + N (N_k)⁺ (p − f₀)_k with wanted forces p in the cables k, NaN in the others,
+    changed least from :func:`quadratic`. Wanted forces that contradict each other are met with the
+    least sum of squares; NaN where none within the limits balance the wrench."""
     low, high = limits.between(structure.shape[1])
     start, null, given = (
         quadratic(structure, wrench, limits),
@@ -307,10 +300,7 @@ def steepest_force(force: Array, distance: Array) -> float:
 
 
 def null_space(structure: Array) -> Array:
-    """Orthonormal basis of the cable forces that balance each other.
-
-    ``structure`` (6, n): structure matrix Aᵀ. Returns (n, n − rank): null space of Aᵀ.
-    """
+    """Orthonormal basis of the cable forces that balance each other, (n, n − rank)."""
     _, values, right = np.linalg.svd(structure)
     rank = int(np.sum(values > _RANK * values[0]))
     return np.asarray(right[rank:].T)

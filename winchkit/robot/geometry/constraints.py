@@ -1,36 +1,17 @@
 """Constraint equations of a cable robot's poses, with every first derivative.
 
-At a pose with position c and rotation R, cable i of n gives one closure equation, and every
-further instrument gives its own rows. A residual is model less measurement, in SI. Calibration
-fits the geometry in these equations; diagnosis fits effects beside them. The pose is unknown in
-both.
+At a pose with position c and rotation R each cable gives one closure equation, and every further
+instrument its own rows; a residual is model less measurement, in SI. The pose is unknown.
 
-``closure`` (closure, CABTIVE paper, Eq. 1 to 3). Geometric length against the length by the drum:
+``closure`` (CABTIVE paper, Eq. 1 to 3). Geometric length L with the arc on the swivel pulley
+against the length by the drum, with the home pose c₀, R₀, the strain ε against home, the stressed
+dead length d between drum and exit point, an offset h of the home length, and the cable ΔW that the
+drum winds in from home to the drum angle φ:
 
     r = L(c, R) − ε (L(c, R) + d) − [L(c₀, R₀) + h − ΔW(φ)]
 
-with the home pose c₀, R₀, the strain ε against home, the stressed dead length d between drum and
-exit point, an offset h of the home length, and the cable ΔW that the drum winds in from home to
-the drum angle φ. L is the length with the arc on the swivel pulley
-(:mod:`winchkit.robot.geometry.kinematics`). With u the direction of the cable from pulley to
-platform, γ its wrap angle, p exit point, b anchor point, r_p swivel radius and r_w winding radius
-
-    ∂r/∂c = (1 − ε) u                        ∂r/∂ω = (1 − ε) (R b) × u
-    ∂r/∂p = −(1 − ε) u + u₀                  ∂r/∂b = (1 − ε) Rᵀ u − R₀ᵀ u₀
-    ∂r/∂r_p = (1 − ε)(γ − sin γ) − (γ₀ − sin γ₀)
-    ∂r/∂r_w = ∂ΔW/∂r_w     ∂r/∂g = ∂ΔW/∂g    ∂r/∂h = −1     ∂r/∂ε = −(L + d)
-
-where ω is a rotation vector in the base frame, R' = exp([ω]×) R, and g the growth of the winding
-radius per turn.
-
-``position``: c − c_measured. ``rotation``: the rotation vector of R R_measuredᵀ where all three
-angles were measured, with the unit matrix for its derivative by ω (exact at a residual of zero);
-else the differences of the measured angles, with the rates of
-:func:`~winchkit.model.rotation.angle_rates`.
-
-``swivel``: angle of the swivel pulley plus the zero of its instrument less the reading, within ±π.
-
-``cable_length``: L plus the offset of the length instrument less the reading.
+Derivatives by rotation are those by a rotation vector ω in the base frame, R' = exp([ω]×) R. Those
+of a rotation vector between two rotations are exact at a residual of zero.
 
 The balance of forces at the platform is in :mod:`winchkit.robot.forces.balance`.
 
@@ -54,6 +35,7 @@ from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
     Sensitivities,
+    by_pose,
     linearised,
     sensitivities,
     swivel_angle,
@@ -84,12 +66,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Winding:
-    """Cable wound in since home, linear in all but the winding radius.
-
-    Notes
-    -----
-    ΔW = √(r² + lead²) Δφ + g gain + rest, for every winding law of :mod:`winchkit.model.drum`.
-    """
+    """Cable wound in since home, ΔW = √(r² + lead²) Δφ + g gain + rest, for every winding law."""
 
     turned: Array
     """Drum angle since home Δφ, (p, n), rad."""
@@ -105,10 +82,8 @@ class Winding:
         return np.hypot(radius, self.lead) * self.turned + growth * self.gain + self.rest
 
     def by_radius(self, radius: Array) -> Array:
-        """Derivative of :meth:`wound` by each line's winding radius, (p, n).
-
-        At a radius of zero on a drum without grooves: its limit from above.
-        """
+        """Derivative of :meth:`wound` by each line's radius r, (p, n); at r = 0 without grooves its
+        limit from above."""
         turn = np.hypot(radius, self.lead)
         share = np.divide(radius, turn, out=np.ones_like(turn), where=turn > 0)
         return np.asarray(share * self.turned)
@@ -166,14 +141,8 @@ def closure(
     strain: Strain | None = None,
     dead_length: Array | float = 0.0,
 ) -> Constraint:
-    """Closure equations with derivatives by pose, geometry and drums.
-
-    ``geometry``: of n lines. ``pose``, ``home``: the p poses and the home pose. ``by_drum`` (p, n):
-    unstrained lengths by the drums with this geometry's lengths at home, m. ``radius`` (n,):
-    winding radii, m. ``dead_length`` (n,): stressed cable between drum and exit point, m. Returns:
-    ``by_line`` has ``exit_point``, ``anchor_point``, ``swivel_radius``, ``winding_radius`` and
-    ``home_length``; ``by_robot`` has ``layer_growth`` and what the strain depends on.
-    """
+    """Closure equations, by pose, each line's geometry and drum, ``layer_growth`` and what the
+    strain depends on; ``by_drum``: unstrained lengths by the drums, (p, n), m."""
     length, by = linearised(geometry, pose.position, pose.rotation)
     at_home = sensitivities(geometry, home.position, home.rotation)
     taken = 0.0 if strain is None else strain.value
@@ -236,31 +205,20 @@ def swivel(
 def cable_length(
     geometry: Geometry, pose: Pose, measured: Array, offset: Array | float = 0.0
 ) -> Constraint:
-    """Geometric lengths plus offsets of their instruments less readings, (p, n), m.
-
-    ``by_line`` has the geometry and ``length_offset``.
-    """
+    """Geometric lengths plus offsets of their instruments less readings, (p, n), m."""
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
     return Constraint(length + offset - measured, by_pose(by), by_line)
 
 
 def mean_offset(residual: Array, *, angles: bool) -> Array:
-    """Offset of each line's instrument that makes its mean residual zero, (n,).
-
-    ``residual`` (p, n): NaN where nothing was measured; a line without measurements gets zero.
-    ``angles``: whether residuals are angles, rad, whose mean is the circular one.
-    """
+    """Offset of each line's instrument that makes its mean residual zero, (n,); zero without
+    measurements. The mean of ``angles``, rad, is the circular one."""
     known = np.isfinite(residual)
     values = np.where(known, residual, 0.0)
     if angles:
         return np.asarray(-np.angle(np.where(known, np.exp(1j * values), 0.0).sum(axis=0)))
     return np.asarray(-values.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
-
-
-def by_pose(by: Sensitivities) -> Array:
-    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
-    return np.concatenate([by.position, by.rotation], axis=-1)
 
 
 def wrapped(angle: Array) -> Array:

@@ -1,8 +1,5 @@
 """Forward kinematics: the platform's pose from cable lengths.
 
-    found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
-    found.pose.position[found.converged]
-
 With as many cables as degrees of freedom, or more, that hold all of these, the pose is the
 least-squares solution of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the
 platform hangs where its potential energy is least under the constraint of the lengths (sequential
@@ -27,7 +24,14 @@ from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.geometry.hessian import length_hessian
-from winchkit.robot.geometry.kinematics import Geometry, Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import (
+    Geometry,
+    Pose,
+    by_pose,
+    lengths,
+    linearised,
+    sensitivities,
+)
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_hessian
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
@@ -304,12 +308,9 @@ def _lattice(free: tuple[float, ...]) -> Array:
 
 
 def _starts(geometry: Geometry, given: Array, start: Pose) -> Pose:
-    """Poses from which the search begins, (p, s, 3) and (p, s, 3, 3), the best first.
-
-    Each rotation of the lattice gets the position that meets the lengths best, by damped
-    Gauss-Newton steps with fixed exit points, from either side of the plane that is nearest to the
-    exit points: where they lie in it, lengths say nothing of the side.
-    """
+    """Poses from which the search begins, (p, s, 3) and (p, s, 3, 3), the best first. Each rotation
+    has the position that meets the lengths best, from either side of the plane nearest to the exit
+    points: where they lie in it, lengths say nothing of the side."""
     moved = geometry.free[:3] > 0
     lattice = _lattice(tuple(geometry.free[3:].tolist()))
     rotation = np.tile(lattice @ start.rotation[:, None], (1, 2, 1, 1))
@@ -423,7 +424,7 @@ class _PoseSearch:
     ) -> tuple[Array, Array]:
         """Next step of position and rotation vector, (p, 6), and the cable forces, (p, n)."""
         length, by = linearised(self.geometry, at.position, at.rotation)
-        slope, missing = np.concatenate([by.position, by.rotation], axis=-1), given - length
+        slope, missing = by_pose(by), given - length
         good = np.all(np.isfinite(slope), axis=(1, 2)) & np.all(np.isfinite(missing), axis=1)
         step, forces = np.full((len(given), 6), np.nan), np.full_like(given, np.nan)
         there = at[good]
@@ -501,8 +502,7 @@ def _balanced(matrix: Array) -> tuple[Array, Array]:
 
 def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
     """Whether the cables hold all degrees of freedom, (p,)."""
-    by = linearised(geometry, at.position, at.rotation)[1]
-    slope = np.concatenate([by.position, by.rotation], axis=-1)
+    slope = by_pose(sensitivities(geometry, at.position, at.rotation))
     normal = np.swapaxes(slope, 1, 2) @ slope + np.diag(1 - geometry.free)
     stiff = np.linalg.eigvalsh(_balanced(normal)[0])
     return np.asarray(stiff[:, 0] > _LOOSE)

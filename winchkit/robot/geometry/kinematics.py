@@ -89,6 +89,16 @@ class Sensitivities:
     """By the line's own swivel radius, (p, n)."""
 
 
+def lever_of(geometry: Geometry) -> float:
+    """Rms distance of the anchor points from the platform's origin, m."""
+    return float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
+
+
+def by_pose(by: Sensitivities) -> Array:
+    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
+    return np.concatenate([by.position, by.rotation], axis=-1)
+
+
 class _Tangent(NamedTuple):
     """The cable around its pulley: arrays of shape (p, n), vectors by component."""
 
@@ -134,10 +144,7 @@ def home_of(profile: RobotProfile) -> Pose:
 
 
 def guided(pose: Pose, home: Pose, free: Array) -> Pose:
-    """Poses with those coordinates of home that guides hold, and all others as they are.
-
-    ``pose``: the p poses. ``home``: one pose. ``free`` (6,): of :class:`Geometry`.
-    """
+    """Poses with those coordinates of ``home``, one pose, that guides hold."""
     if free.all():
         return pose
     turned = rotation_vector(pose.rotation @ home.rotation[0].T) * free[3:]
@@ -222,10 +229,8 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
 
 
 def straight_cables(geometry: Geometry, pose: Pose) -> tuple[Array, Array]:
-    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame.
-
-    ``geometry``: of n lines. ``pose``: the p poses. NaN where an anchor lies inside its pulley.
-    """
+    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame; NaN
+    where an anchor lies inside its pulley."""
     t = _tangent(geometry, pose.position, pose.rotation)
     away = -linearised(geometry, pose.position, pose.rotation)[1].exit_point
     end = np.stack(t.arm, axis=-1) + pose.position[:, None]
@@ -299,8 +304,7 @@ def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Ar
         Forces first, then moments about the platform's origin, base axes; Aᵀ f + w = 0 at rest
         (IPAnema paper, Eq. 7). Rows of coordinates that guides hold are zero.
     """
-    by = sensitivities(geometry, position, rotation)
-    return -np.concatenate([by.position, by.rotation], axis=-1).transpose(0, 2, 1)
+    return -by_pose(sensitivities(geometry, position, rotation)).transpose(0, 2, 1)
 
 
 def _unit(t: _Tangent) -> list[Array]:

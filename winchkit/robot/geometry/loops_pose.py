@@ -21,10 +21,8 @@ solution, m: a hundred times what is left by rounding."""
 
 
 def normal(rows: Any, values: Any, width: int, system: Any) -> None:
-    """GᵀG, its lower half by rows, then Gᵀ v, with one of the ``values`` every ``width``.
-
-    Every sum is a variable of its own: six columns a to f of G, v the value.
-    """
+    """GᵀG, its lower half by rows, then Gᵀ v, with one of the ``values`` every ``width``. A
+    variable for each sum: six columns a to f of G, v the value."""
     aa = ba = bb = ca = cb = cc = da = db = dc = dd = 0.0
     ea = eb = ec = ed = ee = fa = fb = fc = fd = fe = ff = 0.0
     va = vb = vc = vd = ve = vf = 0.0
@@ -161,12 +159,9 @@ def straighten(pose: Any) -> None:
 def find_loop(
     cables: Function, normal: Function, solve: Function, turn: Function, straighten: Function
 ) -> Function:
-    """Loop of Gauss and Newton's method; moves the given pose.
-
-    Returns the number of steps; −1 where they are more than ``most``, or where a length differs by
-    more than ``met`` before a last step below ``tolerance``. From far away all lengths have to be
-    met exactly.
-    """
+    """Loop of Gauss and Newton's method; moves the given pose and returns the steps, −1 for more
+    than ``most``, or where a length differs by more than ``met`` before a last step below
+    ``tolerance``. From far away all lengths have to be met exactly."""
 
     def find(  # noqa: PLR0917 - numba takes no keywords
         lines: Any, given: Any, pose: Any, work: Any, tolerance: float, met: float, most: int

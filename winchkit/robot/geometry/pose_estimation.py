@@ -1,9 +1,8 @@
 """Least-squares estimate of poses from what was measured at each, with the robot given.
 
-Gauss and Newton's method for all poses at once. A step solves (JᵀJ + D) δ = −Jᵀ r for each pose,
-with the whitened equations r, their derivatives J by position and rotation vector, and a diagonal
-D that keeps directions that nothing measured where they are. D is in the step alone and not in the
-cost, so that it slows the iteration and does not bias its end.
+A step of Gauss and Newton's method solves (JᵀJ + D) δ = −Jᵀ r for each pose. The diagonal D keeps
+directions that nothing measured where they are; it is in the step and not in the cost, so that it
+slows the iteration and does not bias its end.
 """
 
 from __future__ import annotations
@@ -38,12 +37,8 @@ class Iteration:
 def estimated_pose(
     whitened: Callable[[Pose], tuple[Array, Array]], start: Pose, iteration: Iteration
 ) -> Pose:
-    """Poses with the least sum of squares of whitened residuals.
-
-    ``whitened``: from p poses to residuals (p, r) in standard deviations and their derivatives
-    (p, r, 6) by position and rotation vector; both zero where nothing was measured. Returns: after
-    the last step, whether or not the iteration has converged.
-    """
+    """Poses with the least sum of squares of whitened residuals (p, r), zero where nothing was
+    measured as are their derivatives (p, r, 6); also where the iteration has not converged."""
     pose = start
     for _ in range(iteration.steps):
         residual, by_pose = whitened(pose)
@@ -66,14 +61,8 @@ def moved_pose(pose: Pose, step: Array) -> Pose:
 
 
 def start_pose(position: Array, angles: Array, home: Pose, free: Array) -> Pose:
-    """Measured positions and rotations, completed by those of the home pose.
-
-    Coordinates that guides hold are those of home.
-
-    ``position`` (p, 3): m; NaN where a coordinate was not measured. ``angles`` (p, 3): roll, pitch
-    and yaw, rad; NaN where one was not measured. ``home``: the home pose, from which missing
-    coordinates and angles are taken. ``free`` (6,): of the robot's geometry.
-    """
+    """Measured positions and angles, NaN where missing, completed by those of the home pose;
+    coordinates that guides hold are those of home."""
     place = np.where(np.isfinite(position), position, home.position)
     some = np.any(np.isfinite(angles), axis=1)
     rotation = np.repeat(home.rotation, len(position), axis=0)

@@ -75,7 +75,12 @@ class Robot:
     @property
     def winches(self) -> list[WinchProfile]:
         """Profiles of the lines' winches."""
-        return _winches(self.profile)
+        found = []
+        for line in self.profile.line:
+            if not isinstance(line.winch, WinchProfile):
+                raise UsageError(f"line {line.name}: winch '{line.winch}' has not been read")
+            found.append(line.winch)
+        return found
 
     @cached_property
     def lines(self) -> tuple[Line, ...]:
@@ -93,7 +98,7 @@ class Robot:
     @cached_property
     def _rest(self) -> At:
         """A line at rest: effects of place do not depend on motion, and one serves all."""
-        return standing(Line(self.winches[0]), np.zeros(1))
+        return Line(self.winches[0]).at_rest(0.0)
 
     @property
     def dead_length(self) -> Array:
@@ -209,7 +214,7 @@ class Robot:
             turned = drum.angle(wound) - home
             out[:, i] = winch.reference.motor_angle + _ratio(winch) * turned
             for _ in range(_NEWTON_STEPS if line.modifiers else 0):
-                length, arm = line.lengths_and_arms(standing(line, out[:, i], pulled[:, i]))
+                length, arm = line.lengths_and_arms(line.at_rest(out[:, i], pulled[:, i]))
                 out[:, i] += (length - slack[:, i]) / arm
         return out
 
@@ -244,8 +249,7 @@ class Robot:
         pulled, warm = (np.broadcast_to(x, angles.shape) for x in (tension, temperature))
         out = np.empty_like(angles)
         for i, line in enumerate(self.lines):
-            at = standing(line, angles[:, i], pulled[:, i], warm[:, i])
-            out[:, i] = line.lengths(at)
+            out[:, i] = line.lengths(line.at_rest(angles[:, i], pulled[:, i], warm[:, i]))
         return out
 
     def poses_at(
@@ -363,19 +367,6 @@ def _tracker(nominal: Robot, modifiers: Sequence[Modifier]) -> Tracker | None:
     return None if found.is_trivial else found
 
 
-def standing(
-    line: Line,
-    motor_angle: Array,
-    tension: Array | None = None,
-    temperature: Array | None = None,
-) -> At:
-    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
-    zero = np.zeros_like(motor_angle)
-    pulled = zero if tension is None else tension
-    warm = zero + 20.0 if temperature is None else temperature
-    return line.moments(zero, motor_angle, zero, pulled, warm)
-
-
 def cables_of(robot: Robot) -> list[CableLine]:
     """Lines for the loops of a control cycle.
 
@@ -459,12 +450,3 @@ def _law(drum: Drum) -> tuple[float, float, float]:
 
 def _ratio(winch: WinchProfile) -> float:
     return winch.gearbox.direction * winch.gearbox.ratio
-
-
-def _winches(profile: RobotProfile) -> list[WinchProfile]:
-    found = []
-    for line in profile.line:
-        if not isinstance(line.winch, WinchProfile):
-            raise UsageError(f"line {line.name}: winch '{line.winch}' has not been read")
-        found.append(line.winch)
-    return found

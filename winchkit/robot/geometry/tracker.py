@@ -7,14 +7,8 @@ point o of the platform. With the platform at position c and rotation R in the b
 
 with the home position h, about which the frame is turned so that shift t and turn Q are hardly
 correlated, the relative error of its scale s, and the rotation M from platform axes to those of the
-target or of an IMU. Q = exp([q]×) with the rotation vector q. Derivatives by the pose's rotation
-vector ω (R' = exp([ω]×) R) and by the numbers of the instrument:
-
-    ∂y/∂c = (1 + s) Q     ∂y/∂ω = −(1 + s) Q [R o]×     ∂y/∂t = 1     ∂y/∂o = (1 + s) Q R
-    ∂y/∂q = −[(1 + s) Q (c + R o − h)]× J(q)            ∂y/∂s = Q (c + R o − h)
-
-with the left Jacobian J of the rotation vector. An instrument whose rotations are not in the
-tracker's frame (an IMU) shows R_y = R M.
+target or of an IMU. Q = exp([q]×) with the rotation vector q. An instrument whose rotations are not
+in the tracker's frame (an IMU) shows R_y = R M.
 
 :func:`registered` finds a first estimate of these numbers from predicted poses: the rigid
 registration of Umeyama, in turn with a linear least-squares step for shift, offset and scale.
@@ -152,12 +146,8 @@ def pose_behind(tracker: Tracker, reading: Pose) -> Pose:
 
 
 def tracked_position(tracker: Tracker, pose: Pose, measured: Array) -> Constraint:
-    """Position that the tracker should show less the measured one, (p, 3), m.
-
-    ``pose``: the p poses. ``measured`` (p, 3): measured positions, m; NaN where missing. Returns:
-    ``by_robot`` has ``tracker_frame`` (shift and rotation vector), ``reflector`` and
-    ``tracker_scale``.
-    """
+    """Position that the tracker should show less the measured one, (p, 3), m, by pose, frame (shift
+    and rotation vector), reflector and scale."""
     turned = np.broadcast_to(rotation_by(tracker.turn), pose.rotation.shape)
     lever = pose.rotation @ tracker.offset
     arm = _times(turned, pose.position + lever - tracker.home)
@@ -196,12 +186,8 @@ def tracked_rotation(tracker: Tracker, pose: Pose, angles: Array) -> Constraint:
 
 
 def registration(seen: Array, point: Array) -> tuple[Array, Array, float]:
-    """Similarity that carries points to their measured places, by Umeyama's closed form.
-
-    ``seen`` (p, 3): measured places y, m. ``point`` (p, 3): points x, m. Returns: ``rotation``
-    (3, 3): Q of Σ |y − t − k Q x|² → min; ``shift`` (3,): t for k = 1; ``scale``: k; 1 where the
-    points coincide.
-    """
+    """Rotation Q, shift t for a scale of 1, and scale k of Σ |y − t − k Q x|² → min (Umeyama) for
+    points x and their measured places y; k is 1 where the points coincide."""
     mean_seen, mean = seen.mean(axis=0), point.mean(axis=0)
     spread = point - mean
     left, size, right = np.linalg.svd((seen - mean_seen).T @ spread / len(seen))
@@ -215,13 +201,8 @@ def registration(seen: Array, point: Array) -> tuple[Array, Array, float]:
 def registered(
     start: Tracker, pose: Pose, seen: Array, angles: Array, free: Collection[str]
 ) -> Tracker:
-    """First estimate of a tracker's numbers from predicted poses.
-
-    ``start``: values of the numbers that are not free. ``pose``: predicted poses, (p,); NaN where
-    one is unknown. ``seen`` (p, 3): measured positions, m; NaN where missing. ``angles`` (p, 3):
-    measured angles, rad; NaN where missing. ``free``: of ``frame``, ``reflector``, ``scale`` and
-    ``mounting``. Returns: ``start`` where fewer than four positions were measured whole.
-    """
+    """First estimate of the ``free`` numbers of a tracker from predicted poses, NaN where unknown;
+    ``start`` where fewer than four positions were measured whole."""
     known = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(pose.position), axis=1)
     if np.count_nonzero(known) >= 4:
         start = _located(start, pose[known], seen[known], free)

@@ -1,15 +1,13 @@
 """Levenberg-Marquardt fit of all poses and parameters, with priors and bounds.
 
 With whitened residuals r, their derivatives A by pose (p blocks of 6 columns) and B by parameters
-in standard deviations of their priors, the normal equations are
+in standard deviations of their priors, whose distance from their nominal values is x,
 
     [AᵀA  AᵀB    ] [pose step ]      [Aᵀ r    ]
     [BᵀA  BᵀB + 1] [parameters] = −  [Bᵀ r + x]
 
-with x the parameters' distance from their nominal values, so that the prior is the unit matrix.
 Every equation belongs to one pose, so that AᵀA is block diagonal (6 by 6) and the equations are
-reduced to the parameters by the Schur complement BᵀB − BᵀA (AᵀA)⁻¹ AᵀB. A step costs the square of
-the number of parameters per pose.
+reduced to the parameters by the Schur complement BᵀB − BᵀA (AᵀA)⁻¹ AᵀB.
 
 References
 ----------
@@ -108,8 +106,7 @@ class BundleEquations(Protocol):
 
 @dataclass(frozen=True)
 class Weights:
-    """Standard deviation of each kind of equation, and whether Huber's loss takes the squares'
-    place."""
+    """Standard deviation of each kind of equation, and whether the loss is Huber's."""
 
     sigma: Mapping[str, float]
     robust: bool = False
@@ -146,10 +143,8 @@ class ReducedEquations:
     """Gradient of the cost by the scaled parameters, poses eliminated, with the prior, (q,)."""
 
     def damped(self, damping: float) -> ReducedEquations:
-        """The same equations with the poses damped as the parameters are.
-
-        A pose with few measurements has the longest step of its own.
-        """
+        """The same equations with the poses damped as the parameters are: a pose with few
+        measurements has the longest step of its own."""
         return self if damping == 0.0 else _reduced(self.cost, self.prior, self.stack, damping)
 
     @property
@@ -193,17 +188,11 @@ def solve(
     weights: Weights,
     progress: Progress | None = None,
 ) -> Solution:
-    """Fit poses and parameters by Levenberg and Marquardt's method with bounds.
+    """Fit poses and parameters by Levenberg and Marquardt's method with bounds. A step to where an
+    equation has no finite value, so that its measurement would no longer count, is rejected.
 
-    Returns: the state after the last step that reduced the cost. ``converged`` is false after 60
-    steps or where no step reduces the cost. A step to where an equation has no finite value, so
-    that its measurement would no longer count, is rejected.
-
-    Notes
-    -----
-    A step is accepted where the cost falls; the damping is then divided by ten, else multiplied.
-    The iteration ends where the cost falls by less than 1e-3 (1 + 1e-6 cost); a fall of ½ is one
-    standard deviation of an estimate.
+    A fall of the cost of ½ is one standard deviation of an estimate. ``converged`` is false after
+    60 steps or where no step reduces the cost.
     """
     scale = equations.parameters.std
     linear = linearise(equations, state, weights)
@@ -234,11 +223,8 @@ def moved(state: BundleState, values: Array, step: Array) -> BundleState:
 
 
 def linearise(equations: BundleEquations, state: BundleState, weights: Weights) -> ReducedEquations:
-    """Whiten the equations at a state and reduce them to the parameters.
-
-    Equations without a measurement, or without a finite value, get a residual and derivatives of
-    zero.
-    """
+    """Whiten the equations at a state and reduce them to the parameters; residual and derivatives
+    are zero without a measurement or a finite value."""
     scale = equations.parameters.std
     stack = stacked(equations.rows(state), weights, scale)
     prior = np.divide(
@@ -311,11 +297,8 @@ def _pose_steps(linear: ReducedEquations, change: Array) -> Array:
 def _bounded_step(
     equations: BundleEquations, state: BundleState, linear: ReducedEquations, damping: float
 ) -> tuple[Array, NDArray[np.int_]]:
-    """Parameters after a damped step within the bounds, and the bounds that are active.
-
-    Parameters that the step carries beyond a bound are put on it, and the step of the others is
-    computed again (active set).
-    """
+    """Parameters after a damped step, and the bounds that are active: those beyond a bound are put
+    on it, and the step of the others is computed again (active set)."""
     scale = equations.parameters.std
     low, high = equations.parameters.bounds
     held = np.zeros(len(scale), dtype=int)

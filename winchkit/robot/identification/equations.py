@@ -1,13 +1,8 @@
 """Constraint equations of a robot's poses as functions of the parameters of an identification.
 
-The equations and their derivatives are those of :mod:`winchkit.robot.geometry.constraints` and
-:mod:`winchkit.robot.forces.balance`; a residual is model less measurement, in SI. A pose with n
-lines has n closure equations and one for whatever else was measured there: three of its position,
-three of its rotation, a swivel angle and a cable length per line, and six of the balance of
-measured cable forces. The pose itself is always unknown.
-
-A calibration fits the parameters of geometry, winches and instruments, and a law of elongation. A
-diagnosis fits effects of the catalogue (``terms``) beside the geometry:
+A residual is model less measurement, in SI; the pose itself is always unknown. A calibration fits
+the parameters of geometry, winches and instruments, and a law of elongation. A diagnosis fits
+effects of the catalogue (``terms``) beside the geometry:
 
 * the length by the drum of a line with effects is that of :class:`winchkit.model.line.Line`, which
   is the length under load; a law of elongation has the unstrained length, so that its residual is
@@ -55,7 +50,7 @@ from winchkit.robot.geometry.constraints import (
 )
 from winchkit.robot.geometry.kinematics import Pose, lengths
 from winchkit.robot.geometry.pose_estimation import moved_pose, start_pose
-from winchkit.robot.geometry.robot import Robot, standing
+from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import (
     Tracker,
     pose_behind,
@@ -101,10 +96,8 @@ class RobotEquations(ParametrizedRobot):
     """Whether the balance of cable forces takes part; None where a calibration decides it."""
 
     def start(self, values: Array) -> Pose:
-        """Measured poses in the base frame, completed by the home pose.
-
-        A pose that a tracker did not measure whole stands at home.
-        """
+        """Measured poses in the base frame, completed by the home pose, which is also the rotation
+        of a pose that was not measured whole."""
         measured, home = self.measured, self.robot.home
         whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
         angles = np.where(whole, measured.angles, np.nan)
@@ -211,7 +204,7 @@ class RobotEquations(ParametrizedRobot):
         angle, trajectory = self.measured.motor_angle[rows, index], self.trajectory
         temperature = self.temperature[rows, index]
         if trajectory is None:
-            return standing(line, angle, force, temperature)
+            return line.at_rest(angle, force, temperature)
         rate = trajectory.motor_rate[rows, index]
         return line.moments(trajectory.time[rows], angle, rate, force, temperature)
 
@@ -221,13 +214,9 @@ class RobotEquations(ParametrizedRobot):
         return 0.0 if trajectory is None else trajectory.inertial_wrench(robot.platform)
 
     def strain(self, values: Array, robot: Robot, pose: Pose) -> Strain | None:
-        """Strains of the cables at poses; None where no law of elongation is fitted.
-
-        Forces that were not measured are those nearest to the middle force that balance the weight.
-        Their derivatives by pose and geometry are left out: multiplied by a cable's compliance they
-        are a thousandth of the derivatives of the lengths. That by the payload is the product of
-        the law's slope (a forward difference) and the forces' derivative.
-        """
+        """Strains of the cables at poses; None where no law of elongation is fitted. Derivatives by
+        pose and geometry of forces that were not measured are left out: multiplied by a cable's
+        compliance they are a thousandth of those of the lengths."""
         law, force = self.parameters.law, self.measured.tension
         if law is None:
             return None
@@ -249,10 +238,7 @@ class RobotEquations(ParametrizedRobot):
     def constraints(
         self, state: BundleState, robot: Robot | None = None
     ) -> Iterator[tuple[str, Constraint]]:
-        """All equations at a state, by kind, with derivatives by each line's own numbers.
-
-        ``robot``: by default that of the state's values.
-        """
+        """All equations at a state, by kind, with derivatives by each line's own numbers."""
         robot = robot or self.robot_at(state.values)
         of_kind = {
             "closure": self._closure,
@@ -287,11 +273,9 @@ class RobotEquations(ParametrizedRobot):
     def residuals(
         self, state: BundleState, robot: Robot, kinds: Iterable[str], whiten: Array | None = None
     ) -> dict[str, Array]:
-        """Residuals by kind without derivatives, (p, k) each; NaN where nothing was measured.
-
-        ``whiten`` (p, k, 6): adds ``tension``, whitened forces that should carry the weight less
-        those that do, N, in a basis that does not depend on the robot.
-        """
+        """Residuals by kind without derivatives, (p, k) each, NaN where nothing was measured.
+        ``whiten`` (p, k, 6) adds ``tension``, whitened forces that should carry the weight less
+        those that do, N, in a basis that does not depend on the robot."""
         values, pose, measured = state.values, state.pose, self.measured
         length = lengths(robot.geometry, pose.position, pose.rotation)
         force = self.forces(values, robot)
@@ -465,11 +449,8 @@ class RobotEquations(ParametrizedRobot):
 
 
 def _force_behind(line: Line, at: At, shown: Array) -> Array:
-    """Cable force at which a cell shows ``shown``, N, by Newton's method; exact for a gain.
-
-    One difference gives all derivatives: a cell at rest shows every force independently of the
-    others, and friction that remembers others is a small part of the force.
-    """
+    """Cable force at which a cell shows ``shown``, N, by Newton's method with one difference for
+    all: friction that remembers other samples is a small part of the force."""
     force, size = shown.copy(), max(float(np.nanmax(np.abs(shown), initial=0.0)), 1.0)
     step = _FORCE_STEP * size
     for _ in range(_NEWTON_STEPS):
@@ -483,10 +464,8 @@ def _force_behind(line: Line, at: At, shown: Array) -> Array:
 
 
 def placed(equations: RobotEquations, sigma: Mapping[str, float]) -> BundleState:
-    """Nominal parameters within bounds, and the poses estimated with them.
-
-    Swivel angles and length instruments take no part: their zeros are not known.
-    """
+    """Nominal parameters within bounds, and the poses estimated with them, without the instruments
+    whose zeros are not known."""
     values = np.clip(equations.parameters.nominal, *equations.parameters.bounds)
     weights = Weights({**sigma, "swivel": np.inf, "cable_length": np.inf})
     return place(equations, BundleState(values, equations.start(values)), weights)

@@ -1,12 +1,9 @@
 """Instruments of a robot's calibration: which of their numbers are unknown, and their parameters.
 
-Load cells have a gain per line and length counters a scale per line beside their offset.
-
-A tracker that was set up anew has another frame, a reflector sits elsewhere on the platform, a
-scale is off by some ppm, a target or an IMU is mounted at an angle. These numbers are parameters
-beside those of the robot (:mod:`winchkit.robot.geometry.tracker`), one frame per
-session. Each starts from the closed-form registration of the measured poses on those that the
-starting values predict from the motor angles alone.
+A tracker that was set up anew has another frame, one per session, a reflector elsewhere on the
+platform, a scale that is off by some ppm, a target at an angle (:mod:`winchkit.robot.geometry.
+tracker`). These numbers start from the closed-form registration of the measured poses on those that
+the starting values predict from the motor angles alone.
 """
 
 from __future__ import annotations
@@ -107,13 +104,9 @@ def registered_instruments(
     *,
     imu: bool,
 ) -> InstrumentValues:
-    """Instruments with these numbers free, at the values of the closed-form registration.
-
-    ``instruments``: values of the numbers that are not free. ``free``: of :data:`NUMBERS`.
-    ``predicted``: poses by the motor angles alone, (p,); NaN where one was not found. ``imu``:
-    whether rotations are declared to be those of an IMU. Otherwise they are in the tracker's frame
-    if the registration fits them better so. Returns: with ``free``.
-    """
+    """Instruments with these numbers free, at the values of the registration on poses by the motor
+    angles alone. Rotations not of an ``imu`` are in the tracker's frame if the registration fits
+    them better so."""
     variants = [False] if imu or "frame" not in free else [True, False]
     found = [
         _registered(instruments, frozenset(free), predicted, measured, turns) for turns in variants

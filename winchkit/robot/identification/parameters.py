@@ -32,11 +32,8 @@ HOME_LENGTH = "home-length"
 
 
 def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
-    """Values of a profile's effects that a calibration fits.
-
-    Returns: by effect the parameters of a law of elongation, or home lengths by line, SI. Raises
-    FileError for a value that cannot be read.
-    """
+    """Values of a profile's effects that a calibration fits, SI: those of a law of elongation, and
+    home lengths by line. Raises FileError."""
     out: dict[str, dict[str, float]] = {}
     faults: list[Fault] = []
     for table in profile.effect:
@@ -303,13 +300,9 @@ def parameters_of(
     effects: Sequence[str] = (),
     instruments: InstrumentValues | None = None,
 ) -> Parameters:
-    """Parameters of geometry, winches, named effects and instruments.
-
-    ``measured``: readings, whose instruments have zeros where the robot's file does not know them.
-    ``effects``: beside those of the robot's profile. A law of elongation adds home lengths, since
-    the tension at home is unknown. ``instruments``: numbers that are unknown, with their starting
-    values. Raises UsageError for an effect that is no parameter, or two laws of elongation.
-    """
+    """Parameters of geometry, winches, named effects and unknown numbers of instruments. A law of
+    elongation adds home lengths, since the tension at home is unknown. Raises UsageError for an
+    effect that is no parameter, or two laws of elongation."""
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))
     _known(effects)
@@ -331,7 +324,7 @@ def parameters_of(
     if law or "home-length" in effects:
         build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
     if law:
-        build.add("law", _of_law(law, own.get(law, {})))
+        build.add("law", [*_of_law(law, own.get(law, {}))])
     _payload(build, effects)
     unknown = isinstance(robot.profile.instrument.swivels.zero, str)
     if unknown and np.any(np.isfinite(measured.swivel)):
@@ -349,15 +342,13 @@ def parameters_of(
     return found
 
 
-def _of_law(law: str, own: Mapping[str, float]) -> list[IdentifiedParameter]:
+def _of_law(law: str, own: Mapping[str, float]) -> Iterator[IdentifiedParameter]:
     """Parameters of a law that start at the values of the robot's file."""
-    out = []
     for spec in LAWS[law]:
         start = own.get(spec.name, np.nan)
         start = 1 / start if spec.reciprocal else start
         at = start if spec.name in own else spec.nominal
-        out.append(replace(spec, name=f"{law}.{spec.name}", nominal=at))
-    return out
+        yield replace(spec, name=f"{law}.{spec.name}", nominal=at)
 
 
 def _known(effects: Sequence[str]) -> None:

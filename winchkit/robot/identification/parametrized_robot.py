@@ -105,10 +105,8 @@ class ParametrizedRobot:
         return tuple(out)
 
     def robot_at(self, values: Array) -> Robot:
-        """The robot with the parameters' values and effects.
-
-        Only with effects are its drums and gears those of :meth:`profile_at`.
-        """
+        """The robot with the parameters' values; with effects, also its drums and gears are
+        these."""
         if self.terms:
             return robot_with_terms(self.profile_at(values), self.terms_at(values))
         geometry, home, block = self.geometry(values), self.robot.home, self.parameters.block

@@ -42,10 +42,7 @@ Box = tuple[Array, Array]
 
 
 def middle_and_half(values: Array) -> Box:
-    """Middle and half width of each column of (p, k).
-
-    ``values`` (p, k). Returns: middle and half width, (k,) each.
-    """
+    """Middle and half width of each column of (p, k)."""
     low, high = values.min(axis=0), values.max(axis=0)
     return (low + high) / 2, (high - low) / 2
 
@@ -57,20 +54,16 @@ def in_box(box: Box, count: int, rng: np.random.Generator) -> Array:
 
 
 def random_poses(geometry: Geometry, position: Array, angles: Array) -> Pose:
-    """Poses of positions (c, 3), m, and angles (c, 3), rad, without those that have no lengths.
-
-    A pose has no lengths where an anchor point lies inside a swivel pulley.
-    """
+    """Poses of positions (c, 3), m, and angles (c, 3), rad, but for those with an anchor point
+    inside its pulley."""
     rotation = rotation_of(*angles.T)
     sound = np.all(np.isfinite(lengths(geometry, position, rotation)), axis=1)
     return Pose(position[sound], rotation[sound])
 
 
 def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[np.bool_]:
-    """Whether cables that only pull balance the platform's weight at poses, (p,).
-
-    True for robots of fewer cables than degrees of freedom, whose platform hangs.
-    """
+    """Whether cables that only pull balance the weight at poses, (p,); true of hanging
+    platforms."""
     if len(geometry.exit_point) < geometry.degrees:
         return np.ones(len(pose.position), dtype=bool)
     structure = structure_matrix(geometry, pose.position, pose.rotation)
@@ -108,11 +101,7 @@ def simulated(
 
 
 def pose_information(rows: Array, pose_of_row: NDArray[np.intp], count: int) -> Array:
-    """Information matrices XᵀX of each pose, (count, k, k).
-
-    ``rows`` (r, k). ``pose_of_row`` (r,): index of the pose of each row; −1 is the last of
-    ``count``.
-    """
+    """Information matrices XᵀX of each pose, (count, k, k), of rows (r, k); −1 is the last pose."""
     out = np.zeros((count, rows.shape[1], rows.shape[1]))
     for pose in np.unique(pose_of_row):
         own = rows[pose_of_row == pose]
@@ -137,11 +126,8 @@ def noncentrality(information: Array) -> Array:
 def chosen_in_turn(
     candidates: int, count: int, gains: Callable[[], Array], add: Callable[[int, float], bool]
 ) -> None:
-    """Choose poses one after another, each for the greatest gain beside those before.
-
-    ``gains``: gain of every candidate with the poses chosen so far, (candidates,). ``add``: adds a
-    candidate, given its index and gain; returns False where it is refused.
-    """
+    """Choose poses one after another, each for the greatest gain beside those before, unless
+    ``add``, given index and gain, returns False."""
     left = np.ones(candidates, dtype=bool)
     chosen = 0
     while chosen < count and np.any(left):

@@ -83,10 +83,8 @@ class SampledMotion:
         return platform.mass * float(np.sqrt(np.mean(np.sum(std**2, axis=1))))
 
     def earlier(self, delay: float) -> Array:
-        """Displacement to the pose of a time before, (p, 6): position, m, and rotation vector, rad.
-
-        Before the first and after the last sample of a run the speed is taken to be constant.
-        """
+        """Displacement to the pose of a time before, (p, 6): position, m, and rotation vector, rad;
+        at a constant speed beyond the ends of a run."""
         if delay not in self._shifts:
             self._shifts.clear()
             parts = [
@@ -115,11 +113,8 @@ def _displacement(curve: CubicSpline, time: Array, delay: float) -> Array:
 def trajectory_of(
     samples: MotionSamples, profile: RobotProfile
 ) -> tuple[MeasuredPoses, SampledMotion]:
-    """Samples that are compared, and the motion along them.
-
-    Returns: ``measured``: means over blocks. Raises RunError for a run with fewer than 50 samples,
-    and where the motor angles fit no pose.
-    """
+    """Samples that are compared, means over blocks, and the motion along them; raises RunError for
+    a run with fewer than 50 samples, and where the motor angles fit no pose."""
     robot = robot_of(profile)
     rows = samples.measured
     parts, times, rates, motions, faults = [], [], [], [], []
@@ -202,11 +197,9 @@ def _averaged(rows: MeasuredPoses, blocks: list[slice], angle: Array, number: in
 
 
 def _compared(measured: MeasuredPoses) -> tuple[NDArray[np.bool_], MeasuredPoses]:
-    """Samples that have all channels which most samples have; rarer channels are left out.
-
-    The equations of all samples are then the same, as a spectrum over time needs. Missing values
-    of the others are interpolated, and masked.
-    """
+    """Samples that have all channels which most samples have, and the values without rarer
+    channels. All samples then have the same equations, as a spectrum over time needs; missing
+    values are interpolated, and masked."""
     valid = np.ones(len(measured), dtype=bool)
     kept: dict[str, Any] = {}
     for name in _CHANNELS:

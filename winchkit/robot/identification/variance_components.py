@@ -96,11 +96,8 @@ class Component:
 def re_estimated(
     sigma: float, residual: Array, leverage: Array, *, least_redundancy: float, least: float
 ) -> Component:
-    """One step of the iteration for one kind of measurement, of whitened residuals.
-
-    ``least_redundancy``: degrees of freedom below which ``sigma`` is kept; it is also kept below
-    2 % of their number. ``least``: lower limit of the estimate.
-    """
+    """One step of the iteration for one kind of measurement, of whitened residuals; ``sigma`` is
+    kept below ``least_redundancy`` degrees of freedom, and below 2 % of their number."""
     free = float(np.sum(1 - leverage))
     if free < max(least_redundancy, _LEAST_SHARE * len(residual)):
         return Component(sigma, free)
@@ -157,10 +154,8 @@ def noise_of(rows: Sequence[Rows], pose: NDArray[np.intp]) -> PoseNoise:
 
 
 def repeated_differences(rows: Sequence[Rows], pose: NDArray[np.intp]) -> list[Rows]:
-    """Helmert contrasts of rows that repeat a pose; empty without any.
-
-    Geometry and effects are the same at all repeats of a pose and take no part.
-    """
+    """Helmert contrasts of rows that repeat a pose, in which geometry and effects take no part;
+    empty without any."""
     groups = [np.flatnonzero(pose == n) for n in range(int(pose.max()) + 1)]
     many = [g for g in groups if len(g) > 1]
     if not many:

@@ -45,10 +45,8 @@ _LEAST_RADIUS = 1e-4
 def adjustment_of(
     robot: Robot, measured: MeasuredPoses, tracker: Tracker, held: frozenset[str] = frozenset()
 ) -> RobotEquations:
-    """Equations of lengths and positions; the tracker starts at its registration.
-
-    ``held``: blocks of parameters that keep their values.
-    """
+    """Equations of lengths and positions; the tracker starts at its registration, ``held`` blocks
+    of parameters keep their values."""
     robot = replace(robot, profile=replace(robot.profile, effect=()))
     instruments = InstrumentValues(frozenset({"frame", "reflector"}), ("",), (tracker,))
     nothing: dict[str, Any] = {
@@ -81,10 +79,8 @@ def adjusted(adjustment: RobotEquations, pose: Pose, sigma: float) -> Solution:
 
 
 def misfit(adjustment: RobotEquations, solution: Solution, sigma: float) -> float:
-    """Root mean square of the equations of the usual pose, with the priors' part, m.
-
-    A mistake is in every pose, gross errors are in some. Infinite where an equation has no value.
-    """
+    """Root mean square of the equations of the usual pose, with the priors' part, m; infinite where
+    an equation has no value. A mistake is in every pose, gross errors are in some."""
     stack, measured = solution.linear.stack, adjustment.measured
     values = (measured.motor_angle, measured.position)
     count = sum(int(np.count_nonzero(np.isfinite(own))) for own in values)

@@ -22,8 +22,7 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
 from winchkit.robot.files.poses import MeasuredPoses
-from winchkit.robot.geometry.constraints import by_pose
-from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, registered
@@ -206,7 +205,7 @@ class _MistakeSearch:
 
     def _compared(self, count: int) -> list[_Trial]:
         """Trials of ``count`` mistakes at most that agree better than the table, the best ones."""
-        motors = motor_mistakes(self.robot)
+        motors = list(motor_mistakes(self.robot))
         chosen: list[tuple[Mistake, ...]] = [(), *((mistake,) for mistake in motors)]
         if count > 1:
             chosen += permutations(motors, 2)
@@ -229,10 +228,8 @@ class _MistakeSearch:
         return sorted(better, key=lambda trial: trial.error)[: _ADJUSTED * count]
 
     def _by_lengths(self, angle: Array) -> tuple[Pose, Array]:
-        """Poses (h, p) of motor angles (h, p, n) by the lengths alone, and median residuals (h,).
-
-        A constant part of each line is that of its home length, which may be unknown.
-        """
+        """Poses (h, p) of motor angles (h, p, n) by the lengths alone, and median residuals (h,)
+        but for a constant of each line, whose home length may be unknown."""
         many, count, lines = angle.shape
         geometry, home = self.robot.geometry, self.robot.home
         given = self.robot.lengths_at(angle.reshape(-1, lines))
@@ -344,7 +341,7 @@ class _MistakeSearch:
             own = [*frames, *free]
             return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
 
-        plain, every = compared(()), rotation_mistakes()
+        plain, every = compared(()), list(rotation_mistakes())
         if plain.error <= _ANGLE_NOISE:
             return
         best_set = [plain]
@@ -365,10 +362,8 @@ class _MistakeSearch:
 
 
 def _registration(seen: Array, point: Array, *, left_handed: bool) -> tuple[Array, float, float]:
-    """Rotation or rotary reflection (3, 3), scale and median distance, m, of Umeyama's closed form.
-
-    ``seen``, ``point`` (p, 3): m.
-    """
+    """Rotation or rotary reflection (3, 3), scale and median distance, m, by Umeyama's closed
+    form."""
     seen, point = seen - seen.mean(axis=0), point - point.mean(axis=0)
     left, size, right = np.linalg.svd(seen.T @ point)
     wanted = -1.0 if left_handed else 1.0

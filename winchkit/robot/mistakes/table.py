@@ -7,7 +7,7 @@ mistakes that give the same data have one entry.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
 from typing import Any
@@ -57,59 +57,48 @@ class Mistake:
     """Of positions: those shown are ``axes`` @ those meant, (3, 3)."""
 
 
-def motor_mistakes(robot: Robot) -> list[Mistake]:
+def motor_mistakes(robot: Robot) -> Iterator[Mistake]:
     """Exchanged columns, signs and units of the motor angles."""
-    names, out = robot.names, []
+    names = robot.names
     for i, j in combinations(range(len(names)), 2):
         order = np.arange(len(names))
         order[[i, j]] = j, i
-        out.append(
-            Mistake(
-                f"motor-columns:{names[i]}-{names[j]}",
-                f"the motor angles of lines {names[i]} and {names[j]} are exchanged",
-                f"exchange the columns '{names[i]}.motor_angle' and '{names[j]}.motor_angle', or "
-                "import them so",
-                _of("motor_angle", _columns(order)),
-            )
+        yield Mistake(
+            f"motor-columns:{names[i]}-{names[j]}",
+            f"the motor angles of lines {names[i]} and {names[j]} are exchanged",
+            f"exchange the columns '{names[i]}.motor_angle' and '{names[j]}.motor_angle', or "
+            "import them so",
+            _of("motor_angle", _columns(order)),
         )
     for i, name in enumerate(names):
         sign = np.where(np.arange(len(names)) == i, -1.0, 1.0)
-        out.append(
-            Mistake(
-                f"motor-sign:{name}",
-                f"the motor angle of line {name} has the other sign",
-                f"negate '{name}.motor_angle', or set gearbox.direction of its winch",
-                _of("motor_angle", _times(sign)),
-            )
+        yield Mistake(
+            f"motor-sign:{name}",
+            f"the motor angle of line {name} has the other sign",
+            f"negate '{name}.motor_angle', or set gearbox.direction of its winch",
+            _of("motor_angle", _times(sign)),
         )
-    out.append(
-        Mistake(
-            "motor-sign:all",
-            "all motor angles have the other sign",
-            "negate them, or set gearbox.direction of the winches",
-            _of("motor_angle", _times(-1.0)),
-        )
+    yield Mistake(
+        "motor-sign:all",
+        "all motor angles have the other sign",
+        "negate them, or set gearbox.direction of the winches",
+        _of("motor_angle", _times(-1.0)),
     )
     for unit, (factor, words) in _MOTOR_UNITS.items():
-        out.append(
-            Mistake(
-                f"motor-unit:{unit}",
-                f"the motor angles are in {words}",
-                "write their unit into the header, e.g. '1.motor_angle [deg]'",
-                _of("motor_angle", _times(factor)),
-            )
+        yield Mistake(
+            f"motor-unit:{unit}",
+            f"the motor angles are in {words}",
+            "write their unit into the header, e.g. '1.motor_angle [deg]'",
+            _of("motor_angle", _times(factor)),
         )
     ratios = np.array([winch.gearbox.ratio for winch in robot.winches])
     if np.any(ratios != 1.0):
-        out.append(
-            Mistake(
-                "motor-unit:drum",
-                "the motor angles are those of the drums, behind the gearboxes",
-                "multiply them by gearbox.ratio",
-                _of("motor_angle", _times(ratios)),
-            )
+        yield Mistake(
+            "motor-unit:drum",
+            "the motor angles are those of the drums, behind the gearboxes",
+            "multiply them by gearbox.ratio",
+            _of("motor_angle", _times(ratios)),
         )
-    return out
 
 
 def row_mistakes() -> list[Mistake]:
@@ -190,51 +179,46 @@ def unit_mistake(unit: str) -> Mistake:
     )
 
 
-def rotation_mistakes() -> list[Mistake]:
+def rotation_mistakes() -> Iterator[Mistake]:
     """Units and conventions of the rotations."""
-    out = [
-        _turned(
-            "transposed",
-            "are those of the base in the platform's axes (R transposed)",
-            "transpose them",
-            lambda a: np.swapaxes(rotation_of(*a.T), 1, 2),
-        ),
-        _turned(
-            "xyzw",
-            "were read from quaternions with the scalar last (x, y, z, w)",
-            "name the columns in their order",
-            _quaternions([3, 0, 1, 2]),
-        ),
-        _turned(
-            "wxyz",
-            "were read as quaternions with the scalar last, which stands first (w, x, y, z)",
-            "name the columns in their order",
-            _quaternions([1, 2, 3, 0]),
-        ),
-        _turned(
-            "vector",
-            "are rotation vectors (axis times angle)",
-            "convert them to roll, pitch and yaw or to quaternions",
-            rotation_by,
-        ),
-    ]
+    yield _turned(
+        "transposed",
+        "are those of the base in the platform's axes (R transposed)",
+        "transpose them",
+        lambda a: np.swapaxes(rotation_of(*a.T), 1, 2),
+    )
+    yield _turned(
+        "xyzw",
+        "were read from quaternions with the scalar last (x, y, z, w)",
+        "name the columns in their order",
+        _quaternions([3, 0, 1, 2]),
+    )
+    yield _turned(
+        "wxyz",
+        "were read as quaternions with the scalar last, which stands first (w, x, y, z)",
+        "name the columns in their order",
+        _quaternions([1, 2, 3, 0]),
+    )
+    yield _turned(
+        "vector",
+        "are rotation vectors (axis times angle)",
+        "convert them to roll, pitch and yaw or to quaternions",
+        rotation_by,
+    )
     for order, columns in product(permutations("xyz"), permutations(range(3))):
         if (order, columns) == (("z", "y", "x"), (0, 1, 2)):
             continue
-        out.append(_euler("".join(order), columns))
+        yield _euler("".join(order), columns)
     for factor, code, words in (
         (np.pi / 180, "deg", "degrees, and are read as radians"),
         (180 / np.pi, "rad", "radians, and are read as degrees"),
     ):
-        out.append(
-            Mistake(
-                f"rotation-unit:{code}",
-                f"the rotations are in {words}",
-                "write their unit into the header, e.g. 'platform_roll [deg]'",
-                _of("angles", _times(factor)),
-            )
+        yield Mistake(
+            f"rotation-unit:{code}",
+            f"the rotations are in {words}",
+            "write their unit into the header, e.g. 'platform_roll [deg]'",
+            _of("angles", _times(factor)),
         )
-    return out
 
 
 def _euler(order: str, columns: tuple[int, ...]) -> Mistake:

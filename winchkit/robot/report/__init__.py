@@ -1,5 +1,4 @@
 """Pages, figures and texts of robots.
 
-``diagnosis`` and ``calibration`` are whole pages, ``pose_traces`` the data of their figures,
-``data`` the tables of the poses; ``notebook`` shows results in consoles and notebooks.
+``diagnosis`` and ``calibration`` are whole pages; ``notebook`` registers renderers.
 """

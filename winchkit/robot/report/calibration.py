@@ -15,6 +15,7 @@ from winchkit.report.html.markup import Markup, element, folded, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
 from winchkit.report.words.sentence import capital
+from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.calibration.results import candidate_lines, in_words, noise_words
 
 if TYPE_CHECKING:
@@ -37,10 +38,7 @@ def calibration_html(
     source: str = "",
     written: str = "",
 ) -> str:
-    """The page, self-contained.
-
-    ``written``: empty where none was.
-    """
+    """The page, self-contained; ``written`` is the profile, empty where none was."""
     chip, tone = _verdict(found)
     figures = calibration_figures(found, source)
     pair = [figure_block(figure, _SIDE) for figure in figures]
@@ -78,8 +76,6 @@ def _compared(found: Calibrated) -> str:
 
 def headline(found: Calibrated) -> str:
     """Return the result of a calibration in a sentence."""
-    from winchkit.robot.calibration.prediction import rms
-
     if found.refusal:
         return "The robot is not calibrated"
     before, after = found.validation_before.distance, found.validation_after.distance
@@ -148,8 +144,6 @@ def _readable(name: str) -> str:
 
 
 def _sentences(found: Calibrated) -> Iterator[str]:
-    from winchkit.robot.calibration.prediction import rms
-
     before, after = found.validation_before, found.validation_after
     if isfinite(rms(after.distance)):
         yield (
@@ -210,8 +204,7 @@ def _figure(
         size[~(size > 0)] = np.nan
         series.append(FigureSeries(word, tone, number, size, "points"))
     for drawn in series[:2]:
-        known = drawn.y[np.isfinite(drawn.y)]
-        mean = float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+        mean = rms(drawn.y)
         ends = np.array([0.0, len(after.distance) + 1.0])
         text = f"rms {quantity(mean / _MM, 'm')}"
         line = FigureSeries("", drawn.tone, ends, np.full(2, mean), "line", text)

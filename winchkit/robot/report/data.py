@@ -29,4 +29,4 @@ def runs_table(dataset: RobotDataset) -> Markup:
 
 def limits(answer: RobotAnswer) -> list[str]:
     """Notes on what the poses cannot show, which are no fault of them."""
-    return missing_pose_excitation(answer.selection.preparation)
+    return list(missing_pose_excitation(answer.selection.preparation))

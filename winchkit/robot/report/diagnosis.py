@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite, nan, sqrt
+from math import isfinite, sqrt
 from typing import Literal
 
 import numpy as np
@@ -29,6 +29,7 @@ from winchkit.report.tables import bar
 from winchkit.report.words.headline import size_texts, worst_outputs
 from winchkit.report.words.sentence import capital, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.diagnosis.add import FittedRobotAddition
 from winchkit.robot.diagnosis.attribution import AXES, on_cables
 from winchkit.robot.diagnosis.compare import RobotCompared
@@ -189,7 +190,7 @@ def _beside(trace: PoseErrorTrace, x: Array) -> Array:
 def _each_line(name: str, lines: Sequence[str], before: Array, after: Array | None) -> Markup:
     """Bars of the error of every line, or axis, before and after."""
     states = [("before", before)] + ([] if after is None else [("after", after)])
-    sizes = {tone: [_rms(values[:, k]) for k in range(len(lines))] for tone, values in states}
+    sizes = {tone: [rms(values[:, k]) for k in range(len(lines))] for tone, values in states}
     every = [size for own in sizes.values() for size in own if isfinite(size)]
     longest = max(every, default=0.0)
     scale = scale_for(longest, UNITS[name])
@@ -204,11 +205,6 @@ def _each_line(name: str, lines: Sequence[str], before: Array, after: Array | No
         " as the least cable forces that balance the residual wrench" if name == "tension" else ""
     )
     return element("div", table(f"Error, rms, by {kind}{least}.", head, rows), class_="bars")
-
-
-def _rms(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(known**2))) if known.size else nan
 
 
 def _of_answer(answer: RobotAnswer, source: str) -> _PoseReport:

@@ -127,8 +127,7 @@ def _draw_sizes(axis: Axes, values: Array, color: str, word: str) -> None:
         return
     number = np.arange(1, len(values) + 1)
     axis.plot(number[known], values[known], ".", ms=3, color=color, label=word)
-    rms = float(np.sqrt(np.mean(values[known] ** 2)))
-    axis.axhline(rms, color=color, lw=0.8, ls="--", label=f"rms {word}")
+    axis.axhline(rms(values[known]), color=color, lw=0.8, ls="--", label=f"rms {word}")
     axis.set_yscale("log")
 
 

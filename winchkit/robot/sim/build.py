@@ -32,10 +32,8 @@ class BuiltRobot(NamedTuple):
 
 
 def build_robot(bench: SimBench, truth: PlatformTruth, *, compiled: bool = False) -> BuiltRobot:
-    """Build a declared robot; FileError where its cables do not hold the platform at home.
-
-    ``compiled`` has numba compile the mechanics; ImportError where it is not installed.
-    """
+    """Build a declared robot, its mechanics ``compiled`` by numba; FileError where its cables do
+    not hold the platform at home, ImportError without numba."""
     from winchkit.schema.read import read_robot
 
     wiring = bench.bench.robot

@@ -13,14 +13,8 @@ advance by itself."""
 
 
 class Coupling:
-    """Advances the platform to the time that all winches have reached.
-
-    Each winch integrates its own motor up to the instants of its frames and instruments. Beyond the
-    platform's time, at most one tick, its cable continues with the last rate of its length.
-
-    ``tension`` (n,): cable forces at the start, N. ``axial_stiffness``: EA of the cables, N.
-    ``dead_length``: cable between drums and exit points, (n,), m.
-    """
+    """Advances the platform to the time that all winches have reached. Beyond it, at most one tick,
+    each winch's cable continues with the last rate of its length."""
 
     def __init__(
         self,

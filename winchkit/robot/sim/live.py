@@ -18,12 +18,8 @@ from winchkit.schema.simbench import SimBench, WinchTruth
 
 
 class LivePlatform:
-    """Platform, cable ends and tracker of a simulated bench; not thread-safe.
-
-    ``bench``: a bench with ``[robot]``. ``started``: time at which the winches start, s.
-    ``compiled``: whether the mechanics are compiled, where numba is installed; it takes a second or
-    two.
-    """
+    """Platform, cable ends and tracker of a simulated bench, ``compiled`` where numba is installed,
+    which takes a second or two; not thread-safe."""
 
     def __init__(
         self,

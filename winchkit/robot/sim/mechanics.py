@@ -202,10 +202,8 @@ def solve(matrix: Any, right: Any) -> None:
 
 
 def compiled_step() -> Callable[..., None]:
-    """:func:`step` compiled by numba, which takes seconds unless an earlier one is found on disk.
-
-    Raises ImportError where numba is not installed.
-    """
+    """:func:`step` compiled by numba, in seconds unless one is found on disk; ImportError without
+    it."""
     from numba import njit
     from numba.extending import register_jitable
 

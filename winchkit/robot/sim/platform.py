@@ -54,12 +54,8 @@ class Pulleys:
 
 
 class CablePlatform:
-    """The platform; n cables pull it.
-
-    ``position`` (3,): of the platform's origin at the start, at rest, m. ``attitude`` (3, 3).
-    ``damping_time``: ratio of damping to stiffness, s. ``compiled``: compile the step by numba,
-    which takes seconds; ImportError where it is not installed.
-    """
+    """The platform, pulled by n cables, at rest at ``position`` (3,), m; ``compiled`` by numba,
+    which takes seconds; ImportError where it is not installed."""
 
     def __init__(
         self,
@@ -178,11 +174,8 @@ class CablePlatform:
     def advance(
         self, to: float, start: Sequence[float], end: Sequence[float], stiffness: Sequence[float]
     ) -> None:
-        """Integrate until ``to``.
-
-        ``to``: s. ``start``, ``end``: unstrained cable lengths now and then, between which they
-        change linearly, (n,), m. ``stiffness``: of the cables, (n,), N/m.
-        """
+        """Integrate until ``to``, s; unstrained cable lengths (n,), m, change linearly from
+        ``start`` to ``end``."""
         duration = to - self.time
         if duration < _LEAST_STEP:
             return

@@ -20,10 +20,7 @@ _LONGEST = 0.01
 
 
 class SimTracker:
-    """Sends a datagram per pose; its clock starts with the simulation.
-
-    ``send``: takes the bytes of a datagram.
-    """
+    """Sends the bytes of a datagram per pose; its clock starts with the simulation."""
 
     def __init__(
         self,
@@ -39,10 +36,8 @@ class SimTracker:
         self._waiting: deque[tuple[float, bytes]] = deque()
 
     def advance(self, now: float) -> None:
-        """Measure where a period has passed, and send what its delay has passed.
-
-        ``now``: since the start, s; the platform may be behind by a few ms, less than the delay.
-        """
+        """Measure where a period has passed, and send what its delay has passed; the platform may
+        be behind by a few ms, less than the delay."""
         measured, truth = self._platform.time, self._truth
         while measured >= self._next - _ROUNDING:
             instant = max(self._next, measured - _LONGEST)

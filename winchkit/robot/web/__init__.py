@@ -1,5 +1,4 @@
 """The Robot view of the page.
 
-``view`` has its routes and orders, ``robot`` its state, ``live_robot`` the platform of an open
-bench, ``programmes`` the preview of a programme.
+``view`` has its routes and orders, ``robot`` its state.
 """

@@ -141,12 +141,8 @@ class RobotWork:
         return {"row": row, **pose_picture(robot, pose, tension, source)}
 
     def slice(self, height: float, row: int, limits: tuple[float, float]) -> dict[str, Any]:
-        """Wrench feasibility at a height, with the rotation of a pose.
-
-        ``height``: z of the platform's origin, m. ``limits``: of the cable forces, N. Returns:
-        ``x``, ``y``: centres of cells, m; ``margin``: distance of all forces from their limits, N,
-        None where no forces balance the weight.
-        """
+        """Wrench feasibility at a height, m, with the rotation of a pose: the least distance of the
+        forces from their limits by cell, N, None where no forces balance the weight."""
         robot, pose, _ = self._at(row)
         exits = robot.geometry.exit_point
         low, high = exits.min(axis=0), exits.max(axis=0)
@@ -232,11 +228,8 @@ class RobotWork:
 
 
 def pose_picture(robot: Robot, pose: Pose, tension: Array, source: str) -> dict[str, Any]:
-    """Platform and cables at a pose.
-
-    ``tension`` (n,): cable forces, N; NaN where one is not known. ``source``: ``measured``,
-    ``computed`` or ``none``.
-    """
+    """Platform and cables at a pose; tensions are ``measured``, ``computed`` or ``none``, by
+    ``source``."""
     anchors = robot.geometry.anchor_point
     position, rotation = pose.position[0], pose.rotation[0]
     return {

@@ -61,12 +61,11 @@ class Wrenches:
 
 
 def margins(given: Wrenches) -> tuple[Array, Array]:
-    """Levels of wrench feasibility and of wrench closure, (p,) each.
+    """Levels of wrench feasibility, N, and of wrench closure, (p,) each; −inf at singular poses.
 
-    Returns: largest distance of all forces
-    from their limits, N, negative where no forces within the limits balance all wrenches; and the
-    least ratio of the smaller of the largest elements of either sign to Σ|y|, negative where some
-    wrench needs a pushing cable. −inf at singular poses.
+    The largest distance of all forces from their limits, negative where none within them balance
+    all wrenches; and the least ratio of the smaller of the largest elements of either sign to Σ|y|,
+    negative where some wrench needs a pushing cable.
     """
     feasible, closed = (np.full(len(given.structure), -np.inf) for _ in range(2))
     left = np.flatnonzero(np.isfinite(given.structure).all(axis=(1, 2)))

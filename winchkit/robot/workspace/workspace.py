@@ -3,16 +3,14 @@
 Four conditions, each with a level that is positive where it holds:
 
 * ``wrench-feasible``: cable forces within the limits balance the weight, and further forces and
-  moments of any direction up to given ones; the level is the distance of all forces from their
-  limits, N.
+  moments of any direction; the level is the distance of all forces from their limits, N.
 * ``wrench-closure``: pulling cables can balance any wrench, if they are strong enough; the level is
   a ratio without unit (:func:`winchkit.robot.workspace.circuits.margins`).
 * ``twist-feasible``: no cable is faster than its limit while the platform moves at a given speed in
   any direction and turns at one about any axis; the level is the least difference, m/s.
-* ``clear``: cables keep a distance from each other and from bodies; the level is what the least one
-  is above it, m.
+* ``clear``: cables keep a distance from each other and from bodies; the level is the surplus, m.
 
-A position counts where the condition holds in all rotations that are asked for.
+A position counts where the condition holds in all demanded rotations.
 
 References
 ----------
@@ -35,7 +33,7 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import ForceLimits
-from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.kinematics import Pose, lever_of
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.workspace.circuits import Wrenches, margins
 from winchkit.robot.workspace.distances import distances
@@ -249,10 +247,8 @@ def grid_of(
 
 
 def usual_box(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner (3,) of the exit points, m.
-
-    Exit points all above home leave as much room below it.
-    """
+    """Lowest and highest corner (3,) of the exit points, m; all above home leave as much room
+    below."""
     exits, home = robot.geometry.exit_point, robot.home.position[0]
     low, high = exits.min(axis=0), exits.max(axis=0)
     if low[2] > home[2]:
@@ -335,13 +331,13 @@ def _of_wrenches(
     robot: Robot, pose: Pose, structure: Array, demand: CableDemand, limits: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     free = robot.geometry.free > 0
-    spread = float(np.sqrt(np.mean(np.sum(robot.geometry.anchor_point**2, axis=1))))
-    lever = np.repeat([1.0, spread or 1.0], 3)[free]
+    spread = lever_of(robot.geometry) or 1.0
+    lever = np.repeat([1.0, spread], 3)[free]
     given = Wrenches(
         structure[:, free] / lever[:, None],
         robot.weight(pose)[:, free] / lever,
         *limits,
-        (demand.force, demand.moment / (spread or 1.0)),
+        (demand.force, demand.moment / spread),
         int(np.count_nonzero(free[:3])),
     )
     return margins(given)
