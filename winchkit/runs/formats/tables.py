@@ -11,10 +11,7 @@ from winchkit.runs.run import Run
 
 
 def write_mf4(log: Log, path: str | Path) -> None:
-    """Write a log as MDF 4, a group per source with its time stamps, from the first sample of any.
-
-    Raises UsageError without asammdf, FileError where the file cannot be written.
-    """
+    """Write a log as MDF 4, a group per source; raises UsageError without asammdf, FileError."""
     asammdf = library("asammdf", f"{path}: MF4")
     start, _ = log.span
     with asammdf.MDF(version="4.10") as mdf:
@@ -39,10 +36,7 @@ def write_mf4(log: Log, path: str | Path) -> None:
 
 
 def write_parquet(run: Run, path: str | Path) -> None:
-    """Write a run as Parquet: a column per channel, null for NaN, units in the columns' metadata.
-
-    Raises UsageError without pyarrow, FileError where the file cannot be written.
-    """
+    """Write a run as Parquet, null for NaN; raises UsageError without pyarrow, FileError."""
     library("pyarrow", f"{path}: Parquet")
     from pyarrow import parquet
 

@@ -258,8 +258,8 @@ def runs_of(
 ) -> Imported:
     """Runs of all files; those without a motor angle are joined to the one that has it.
 
-    ``mapping``: that of the guesses by default. ``masses``: load of each file. Raises UsageError
-    where the file of the angle is not known; RunError with every fault of every file.
+    Raises UsageError where the file of the angle is not known; RunError with every fault of every
+    file.
     """
     parts = [streams_of(guess) for guess in guesses]
     if not any(has_angle(part) for part in parts):

@@ -109,11 +109,7 @@ def clock_before(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn
 
 
 def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
-    """Columns with numbers and unique names in ``source``.
-
-    ``columns``: in the order of the file. Returns: else with its labels before it, and with ``#2``
-    where these are equal as well.
-    """
+    """Columns with numbers and unique names in ``source``, by their labels or else ``#2``."""
     names = Counter(item.name for item in columns)
     full = [
         item.name if names[item.name] == 1 else " ".join((*item.labels, item.name))

@@ -43,11 +43,7 @@ class _Parts:
 
 
 def by_channel(table: ColumnTable) -> ColumnTable:
-    """A table with one column for each channel, where each row is one value of one channel.
-
-    Returns: values and stamps of each channel in a group of its own, in the order of the file; the
-    table itself where it has another form.
-    """
+    """A table with a group of columns per channel, where each row is one value of one channel."""
     parts = _parts(table)
     if parts is None:
         return table
@@ -143,10 +139,7 @@ def _is_constant(column: FileColumn, codes: NDArray[np.intp]) -> bool:
 
 
 def _is_of_any_quantity(value: FileColumn, names: Sequence[str]) -> bool:
-    """Whether the channels, and not the column of the values, have the names of quantities.
-
-    A file without names needs a channel whose name is known.
-    """
+    """Whether the channels, and not the column of the values, have the names of quantities."""
     if _VALUE.fullmatch(value.name):
         return True
     is_unnamed = value.name == str(value.number)

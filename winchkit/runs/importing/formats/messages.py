@@ -31,11 +31,10 @@ class _Message:
 
 
 def read_messages(path: str, data: bytes) -> ColumnTable:
-    """Read an MCAP file.
+    """Read an MCAP file: columns by topic, with log time and header's stamp in ns.
 
-    Returns: columns by topic, in the order of the file, with the log time and the stamp of the
-    header, in ns since 1970 or on a clock of their own. Raises UsageError for ROS 2 messages
-    without the decoder; RunError for an invalid file, and one without numbers in a known encoding.
+    Raises UsageError for ROS 2 messages without the decoder; RunError for an invalid file, and one
+    without numbers in a known encoding.
     """
     from mcap.reader import NonSeekingReader
 
