@@ -145,10 +145,7 @@ def _escaped(found: re.Match[str]) -> str:
 
 
 def suggest(word: str, known: list[str]) -> str:
-    """``; did you mean 'x'?`` when a known word is close, else nothing.
-
-    Where the word is a part of several names, such as ``creep``, all of them are given.
-    """
+    """``; did you mean 'x'?`` for close names and those that contain the word, else nothing."""
     folded = word.casefold()
     close = [name for name in known if name.casefold() == folded]
     if not close:

@@ -47,10 +47,7 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
 def read_whole(
     path: Path, what: str, largest: int | None = None, error: type[FileError] = FileError
 ) -> bytes:
-    """Content of a regular file, ``what`` in messages; raises ``error`` where it cannot be read.
-
-    Of a file that is larger than ``largest`` (bytes) one byte more.
-    """
+    """Content of a regular file, at most ``largest`` and one bytes; else raises ``error``."""
     try:
         with open(path, "rb", opener=regular) as file:
             return file.read() if largest is None else file.read(largest + 1)

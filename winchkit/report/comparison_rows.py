@@ -32,10 +32,7 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
 
 
 def short_rows(comparison: Comparison) -> list[list[str]]:
-    """Per output its error and noise, and its share of what the output varies.
-
-    The length of a cable varies by metres: a share of it says nothing and is left out.
-    """
+    """Per output its error and noise, and, but of a length, the share of what the output varies."""
     rows = [["error, rms", "", "noise", "of what it varies"]]
     for name in worst_outputs(comparison.outputs):
         error = comparison.outputs[name]

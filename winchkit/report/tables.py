@@ -72,10 +72,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step that is reported, with its doubts.
-
-    ``without``: as in :func:`winchkit.report.text.step_lines`.
-    """
+    """Every step that is reported, with its doubts; ``without`` as in ``step_lines``."""
     errors = [*without, *[{}] * len(diagnosis.steps)]
     items = []
     for index in reported_steps(diagnosis):
@@ -142,10 +139,7 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
 def bar(
     error: float, longest: float, noise: float | None, scale: PrintScale, tone: str = ""
 ) -> Markup:
-    """A bar as a share of the longest, with a mark at the noise, and the value below.
-
-    ``tone`` is a colour of the page, else the table's own.
-    """
+    """A bar as a share of the longest, with a mark at the noise, and the value below."""
     colour = f";background:var(--{tone})" if tone else ""
     inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%{colour}")]
     if noise:

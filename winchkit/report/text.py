@@ -81,10 +81,7 @@ _STEP_LINES = 12
 
 
 def report_text(answer: Answer, *, verbose: bool = False) -> str:
-    """A diagnosis as text.
-
-    Returns: lines of at most 80 characters, at most 29 unless ``verbose``.
-    """
+    """A diagnosis in lines of at most 80 characters, at most 29 unless ``verbose``."""
     diagnosis = answer.diagnosis
     limits = _limits(answer)
     notes = [note for note in diagnosis.notes if verbose or note not in limits]
@@ -149,7 +146,7 @@ def step_lines(
     """Every step that is reported, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
-    from which further steps are named only. Returns: lines of at most 80 characters.
+    from which further steps are named only.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
@@ -168,10 +165,7 @@ def step_lines(
 
 
 def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
-    """A comparison as text: errors per output beside their noise, and where they fail.
-
-    Returns: text of at most 80 columns; with all tables where it is ``verbose``.
-    """
+    """A comparison as text: errors per output beside their noise, and where they fail."""
     blocks = [paragraph(f"{comparison_headline(comparison)}.")]
     if comparison.outputs and not verbose:
         lines = entries(failing(comparison))
@@ -199,10 +193,7 @@ def _tables(comparison: Comparison) -> list[list[str]]:
 
 
 def addition_text(addition: Addition | Removal) -> str:
-    """An added or removed effect as text: fitted values, and held-out errors.
-
-    Returns: text of at most 80 columns.
-    """
+    """An added or removed effect as text: fitted values, and held-out errors."""
     from winchkit.diagnosis.add import Addition
     from winchkit.report.simulated import refit_lines
 
@@ -231,11 +222,7 @@ def error_lines(
     data: str = "runs",
     offsets: Sequence[RunOffset] = (),
 ) -> list[str]:
-    """Held-out errors per output as lines.
-
-    ``data``: kind of data, ``runs`` or ``poses``. ``offsets``: offsets that every run has for
-    itself, whether it is held out or not. Returns: lines of at most 80 characters.
-    """
+    """Held-out errors per output, of ``runs`` or ``poses``, with the offsets of each run."""
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():

@@ -23,10 +23,7 @@ from winchkit.web.state import PageState, Version
 def refit(
     state: PageState, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path
 ) -> PageState:
-    """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.
-
-    Raises UsageError without a diagnosis, and for an unknown effect.
-    """
+    """State with an effect in the profile, refitted but not yet diagnosed; raises UsageError."""
     answer = state.answer
     if answer is None:
         raise UsageError("nothing is diagnosed yet")

@@ -90,10 +90,9 @@ class StoredRun(Protocol):
 
 
 class DiagnoseView:
-    """State of the Diagnose view and the one thread that changes it.
+    """State of the Diagnose view and the one thread that changes it, which calls ``changed``.
 
-    ``folder``: of the server's own. ``changed``: called, from the working thread, whenever there is
-    something new to show. ``work``: the user's folder, by default one within ``folder``.
+    ``folder``: of the server's own. ``work``: the user's folder, by default one within ``folder``.
     """
 
     def __init__(
@@ -166,10 +165,7 @@ class DiagnoseView:
         return self.task("simulating runs", lambda: self._example(name))
 
     def mystery(self, seed: int) -> Future[None]:
-        """Simulate runs of a bench whose hidden effect is shown on request only.
-
-        No command makes them without its name: they are written into the user's folder.
-        """
+        """Simulate runs of a bench with a hidden effect; no command makes them without its name."""
         return self.task("simulating runs", lambda: self._mystery(seed))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:

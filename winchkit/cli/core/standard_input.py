@@ -62,10 +62,7 @@ def may_ask() -> bool:
 
 
 class Readable(click.ParamType):  # type: ignore[type-arg]
-    """A file to read, or standard input.
-
-    ``complete``: by default files.
-    """
+    """A file to read, or standard input."""
 
     def __init__(self, what: str, complete: Completer | None = None) -> None:
         self.name = what

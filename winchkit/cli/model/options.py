@@ -91,10 +91,7 @@ class Asked:
     def runs(
         self, paths: Sequence[str], declared: WinchProfile | RobotProfile | None = None
     ) -> list[Run]:
-        """Runs of the one winch, or of all lines of a robot.
-
-        Raises FileError with the faults of all files.
-        """
+        """Runs of the one winch, or of all lines of a robot; FileError with all faults."""
         if declared is not None and wings.call("compare", declared) is not None:
             if self.predicted is not None:
                 raise UsageError("--predicted: is of one winch or axis, not of a robot")
@@ -292,10 +289,7 @@ def save_page(path: str, page: str) -> None:
 
 
 def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
-    """Names of the winches' own pages beside the page of all: ``report-A.html``.
-
-    Raises UsageError where two winches would get one page.
-    """
+    """Pages beside that of all, ``report-A.html``; UsageError where two winches would get one."""
     page = Path(path)
     names = {w: f"{page.stem}-{_NO_FILE.sub('-', w) or 'winch'}{page.suffix}" for w in winches}
     if len(set(names.values())) < len(names):

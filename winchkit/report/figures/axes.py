@@ -134,10 +134,7 @@ _WITH_A_SIGN = {
 
 
 def reading(variable: str, *, within_turn: bool = False) -> AxisLabel:
-    """Unit and name of a variable; an angle within its turn in degrees, else in turns.
-
-    ``within_turn``: also whether a position is drawn within its period.
-    """
+    """Unit and name of a variable; an angle ``within_turn`` in degrees, else in turns."""
     name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
     if variable in ANGLES:
         within = AxisLabel(f"{name} within its turn", "°", _TURN / _DEGREES)

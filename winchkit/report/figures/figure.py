@@ -1,8 +1,4 @@
-"""A figure as data: series, bands, cells and labels over common axes, without any drawing.
-
-:mod:`winchkit.report.figures.layout` places it, :mod:`winchkit.report.figures.export` writes it as
-SVG, PNG and CSV. Values are in the units of their axes.
-"""
+"""A figure as data in the units of its axes: series, bands, cells and labels, not drawn."""
 
 from __future__ import annotations
 

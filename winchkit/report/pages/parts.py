@@ -41,10 +41,9 @@ def lead(
     rows: Sequence[tuple[str, str]],
     *beside: Markup,
 ) -> Markup:
-    """Result of a page: a word, a headline, and a summary of the comparison and its consequences.
+    """Result of a page: a word, a headline, and a summary of questions and answers, if any.
 
     ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown, undecided.
-    ``rows`` are questions and their answers; empty answers are left out.
     """
     icon = Markup(f'<svg viewBox="0 0 16 16" aria-hidden="true">{_ICONS[tone]}</svg>')
     head = element(

@@ -32,11 +32,7 @@ def caveat_text(code: str) -> str:
 
 
 def finding_texts(findings: Sequence[Finding]) -> list[str]:
-    """Findings as lines, equal ones of several runs in one, alike ones of many runs shortened.
-
-    ``findings``: in order of importance. Returns: one line per channel and text, with the runs that
-    it applies to.
-    """
+    """Findings, the most important first; a line per channel and text, with its runs."""
     runs: dict[tuple[str, str], dict[str, list[str]]] = {}
     for finding in findings:
         alike = runs.setdefault((finding.channel, finding.code), {})

@@ -119,7 +119,6 @@ def step_text(
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
-    ``without``: held-out errors of the final model without the step, SI. Returns:
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
     """
     parts = [_titled_values(step)]
