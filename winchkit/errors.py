@@ -18,9 +18,13 @@ A message says what, where, the value, the limit, and what to do.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 CONTROL_CHARACTERS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u180e\u200b-\u200f"
@@ -115,6 +119,22 @@ class LimitTripped(MotionError):
 
 class NotPermitted(MotionError):
     """A condition for motion is not met, e.g. no drive-side watchdog."""
+
+
+def of_each(
+    read: Callable[[_Item], _Result], items: Iterable[_Item], kind: type[FileError] = FileError
+) -> list[_Result]:
+    """``read`` of every item; raises one error of a ``kind`` with the faults of all items."""
+    found: list[_Result] = []
+    faults: list[Fault] = []
+    for item in items:
+        try:
+            found.append(read(item))
+        except FileError as error:
+            faults += error.faults
+    if faults:
+        raise kind(faults)
+    return found
 
 
 def class_name(error: WinchkitError) -> str:

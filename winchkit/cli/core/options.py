@@ -250,20 +250,24 @@ class BusChoice:
         return bus_only(self.interface, self.channel, self.bitrate, self.port)
 
 
-def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --bench or, in its place, the options of a CAN bus."""
-    options = [
-        bench_file_option(),
-        click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
-        click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
-        click.option(
-            "--bitrate",
-            default=_BITRATE,
-            show_default=True,
-            help="Without a bench: bit rate, bit/s.",
-        ),
-        click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
-    ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+def all_of(*options: Decorator) -> Decorator:
+    """Several options as one, in the order of the help."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+bus_options = all_of(
+    bench_file_option(),
+    click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
+    click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
+    click.option(
+        "--bitrate", default=_BITRATE, show_default=True, help="Without a bench: bit rate, bit/s."
+    ),
+    click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
+)
+"""--bench or, in its place, the options of a CAN bus."""

@@ -15,8 +15,8 @@ from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import PROFILE, RUN, checked, own_effects_option
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.cli.core.options import PROFILE, RUN, all_of, checked, own_effects_option
+from winchkit.errors import Fault, FileError, UsageError, of_each
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
@@ -44,16 +44,16 @@ def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
     )
 
 
-_MODEL_OPTIONS = (
-    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+_MODEL_OPTIONS = all_of(
+    profile_option,
+    own_effects_option(),
+    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
     click.option(
         "--predicted",
         metavar="OUTPUT=COLUMN",
         help="Column of another model's prediction: motor_torque=tau_model.",
     ),
-    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
-    own_effects_option(),
-    profile_option,
+    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
 )
 
 
@@ -161,10 +161,7 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         return function(asked=Asked(profile, effect_files, winch, band, predicted), **others)
 
-    command: Callable[..., Any] = bundled
-    for option in _MODEL_OPTIONS:
-        command = option(command)
-    return command
+    return _MODEL_OPTIONS(bundled)
 
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
@@ -186,16 +183,7 @@ def read_all(paths: Sequence[str]) -> list[Run]:
     """Runs with all that they hold. Raises FileError with the faults of all files."""
     from winchkit.runs import read_run
 
-    runs: list[Run] = []
-    faults: list[Fault] = []
-    for path in paths:
-        try:
-            runs.append(read_run(path))
-        except FileError as error:
-            faults += error.faults
-    if faults:
-        raise FileError(faults)
-    return runs
+    return of_each(read_run, paths)
 
 
 def _of_winch(run: Run, winch: str | None) -> Run:
