@@ -60,10 +60,10 @@ class PrintScale:
             return "unknown"
         return self.labelled(significant(value / self.worth, digits))
 
-    def span(self, low: float, high: float | None, digits: int = 3) -> str:
+    def span(self, low: float, high: float | None) -> str:
         """Two values with one unit: ``0.084 to 0.334 N m``; one value where both are equal."""
-        first, last = self.text(low, digits), self.text(low if high is None else high, digits)
-        return last if first == last else f"{significant(low / self.worth, digits)} to {last}"
+        first, last = self.text(low), self.text(low if high is None else high)
+        return last if first == last else f"{significant(low / self.worth)} to {last}"
 
     def labelled(self, number: str) -> str:
         """A formatted number followed by the unit."""

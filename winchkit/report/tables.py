@@ -28,13 +28,13 @@ from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
     clause,
     combination_text,
     error_scale,
     estimate_text,
     interval_text,
     listed,
+    output_name,
     parameter_name,
     values_text,
 )
@@ -55,7 +55,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
         output = diagnosis.outputs[name]
         scale = error_scale(output)
         last = output.heldout_rms_after if extended else output.heldout_rms_before
-        cells: list[str] = [OUTPUT_NAMES.get(name, name)]
+        cells: list[str] = [output_name(name)]
         cells.append(element("span", scale.text(output.heldout_rms_before), class_="before"))
         if extended:
             cells.append(element("span", scale.text(last), class_="after"))
@@ -119,7 +119,7 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
             *(bar(errors[n], longest[n], o.noise_rms, error_scale(o)) for n, o in outputs.items()),
         ]
 
-    head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
+    head = ["model", *(output_name(name) for name in outputs)]
     caption = "Held-out error, rms, after each added effect. The vertical mark is the noise."
     out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
     if len(ladder.first) > 1:
@@ -163,7 +163,7 @@ def candidates(answer: Answer) -> Markup:
     outputs = diagnosis.outputs
     scales = {name: error_scale(output) for name, output in outputs.items()}
     head = ["effect", "meaning", "evidence"]
-    head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
+    head += [f"{output_name(n)} [{scale.label}]" for n, scale in scales.items()]
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
         "Evidence: reduction of χ² minus a penalty of ln n per parameter (BIC). 1 % false-alarm "

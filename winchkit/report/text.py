@@ -57,6 +57,7 @@ from winchkit.report.words.vocabulary import (
     combination_text,
     error_scale,
     interval_text,
+    output_name,
     parameter_name,
     values_text,
 )
@@ -88,12 +89,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     blocks = [
         head_lines(diagnosis),
         step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
-        error_lines(
-            diagnosis.outputs,
-            extended=bool(reported_steps(diagnosis)),
-            data=diagnosis.data,
-            offsets=diagnosis.run_offsets,
-        ),
+        diagnosed_errors(diagnosis),
         _remaining(answer, verbose=verbose),
         _changes(diagnosis),
         *_data(diagnosis, all_shares=verbose),
@@ -179,8 +175,7 @@ def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
 def _tables(comparison: Comparison) -> list[list[str]]:
     """All figures of a comparison, with the attribution of its errors to variables."""
     attributed = entries(
-        f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
-        for name, error in comparison.outputs.items()
+        f"{output_name(name)}: {followed(error)}" for name, error in comparison.outputs.items()
     )
     blocks = [aligned([HEAD, *size_rows(comparison)])]
     if attributed:
@@ -208,14 +203,20 @@ def addition_text(addition: Addition | Removal) -> str:
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],
-        error_lines(addition.outputs, extended=True),
+        _errors(addition.outputs, extended=True),
         refit_lines(addition.motion) if isinstance(addition, Addition) else [],
         _notes(addition.notes),
     ]
     return joined(blocks)
 
 
-def error_lines(
+def diagnosed_errors(diagnosis: Diagnosis) -> list[str]:
+    """Held-out errors of a diagnosis."""
+    extended, offsets = bool(reported_steps(diagnosis)), diagnosis.run_offsets
+    return _errors(diagnosis.outputs, extended=extended, data=diagnosis.data, offsets=offsets)
+
+
+def _errors(
     outputs: Mapping[str, OutputFit],
     *,
     extended: bool,
@@ -230,13 +231,13 @@ def error_lines(
         noise = noise_text(output).removeprefix("noise ")
         after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
-        rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
+        rows.append([output_name(name), before, *after, noise])
     held_out = f"held out: measured on {data} that the fit had not seen"
     if extended:  # Then values with their deviations stand above.
         held_out = f"± one standard deviation; held out: on {data} that the fit had not seen"
     if not offsets:
         return [*aligned(rows), f"  ({held_out})"]
-    own = " and ".join(dict.fromkeys(OUTPUT_NAMES.get(o.output, o.output) for o in offsets))
+    own = " and ".join(dict.fromkeys(output_name(o.output) for o in offsets))
     held_out += f"; the offset of the {own} is estimated from every run itself"
     return [*aligned(rows), *paragraph(f"({held_out})", "  ", "   "), *_offsets(offsets)]
 
@@ -249,7 +250,7 @@ def _offsets(offsets: Sequence[RunOffset]) -> list[str]:
         scales[offset.output] = scale_for(sizes, offset.unit)
     for offset in offsets[:_MOST_OFFSETS]:
         value = with_std(offset.value, offset.std, offset.unit, scales[offset.output])
-        rows.append([offset.run, OUTPUT_NAMES.get(offset.output, offset.output), value])
+        rows.append([offset.run, output_name(offset.output), value])
     more = len(offsets) - len(rows)
     last = [f"  and {more} further in --json"] if more else []
     return ["", "offset of each run", *aligned(rows, words=2), *last]
@@ -267,7 +268,7 @@ def _ladder(answer: Answer) -> list[str]:
         *((f"only {name}", rms) for name, rms in ladder.first.items()),
         *((f"all but {name}", rms) for name, rms in ladder.last.items()),
     ]
-    rows = [["held-out error, rms", *(OUTPUT_NAMES.get(name, name) for name in scales)]]
+    rows = [["held-out error, rms", *(output_name(name) for name in scales)]]
     rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
     rows.append(["noise", *(noise_text(outputs[n]).removeprefix("noise ") for n in scales)])
     return ["contribution of each effect", *aligned(rows)]

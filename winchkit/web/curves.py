@@ -32,7 +32,7 @@ from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, period_of
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.vocabulary import output_name, variable_name
 from winchkit.runs.run import Run
 
 _PANELS = 6
@@ -92,7 +92,7 @@ class OutputCurves:
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {
             "output": self.output,
-            "name": capital(OUTPUT_NAMES.get(self.output, self.output)),
+            "name": capital(output_name(self.output)),
             "unit": whole.label,
             "residual_unit": self.scale.label,
             "residual_worth": self.scale.worth,
@@ -288,7 +288,7 @@ def _thinned(compared: Indices) -> Indices:
 
 
 def _capital_name(variable: str) -> str:
-    return capital(VARIABLE_NAMES.get(variable, variable))
+    return capital(variable_name(variable))
 
 
 def _largest(values: Array) -> float:

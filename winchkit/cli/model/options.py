@@ -287,12 +287,10 @@ def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
 
 def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
     """``bench-spiral: a.csv, b.csv``, or ``bench-spiral: 12 runs, a.csv to l.csv``."""
+    from winchkit.report.words.vocabulary import runs_listed
+
     added = f" with {effect}" if effect else ""
-    names = [Path(run).name for run in runs]
-    named = ", ".join(names)
-    if len(names) > _RUNS_NAMED:
-        named = f"{len(names)} runs, {names[0]} to {names[-1]}"
-    return f"{profile}{added}: {named}"
+    return f"{profile}{added}: {runs_listed([Path(run).name for run in runs], _RUNS_NAMED)}"
 
 
 def _may_be_replaced(target: Path) -> bool:
