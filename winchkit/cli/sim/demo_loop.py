@@ -66,11 +66,6 @@ def programmes() -> list[Programme]:
     return [read_programme(find("sim", name)) for name in PROGRAMMES]
 
 
-def truth_of(bench: SimBench) -> tuple[str, ...]:
-    """Catalogue ids of the hidden effects; used only after the diagnosis."""
-    return tuple(a for t in bench.truth.values() for spec in t.hidden for a in spec.answers)
-
-
 def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -> list[Path]:
     """Run the programmes on a simulated bench, in simulated time; MotionError where it was late."""
     from winchkit.bench.open import open_bench

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
 
 _MARKERS = frozenset(("marker id", "marker", "tag id", "tag", "aruco id", "fiducial id"))
 """Titles of a column that names the marker whose pose a row has."""
@@ -50,13 +50,7 @@ def by_kind(table: ColumnTable, by: str) -> ColumnTable:
         if own.texts is not None or np.any(np.isfinite(own.values))
     ]
     note = f"each row is of one kind, by column '{key.source}': {', '.join(rows)}"
-    return replace(
-        table,
-        columns=named_apart(columns),
-        line_of=lambda _row: None,
-        interval=None,
-        notes=(*table.notes, note),
-    )
+    return table.rearranged(columns, note)
 
 
 def has_kinds(table: ColumnTable, key: FileColumn) -> bool:

@@ -95,6 +95,16 @@ class ColumnTable:
         same = [c for c in self.columns if own and c.unit and own == _letters(c.name + c.unit)]
         return same[0] if len(same) == 1 else None
 
+    def rearranged(self, columns: Sequence[FileColumn], note: str) -> ColumnTable:
+        """The file with other columns, whose rows are no lines of it."""
+        return replace(
+            self,
+            columns=named_apart(columns),
+            line_of=lambda _row: None,
+            interval=None,
+            notes=(*self.notes, note),
+        )
+
 
 def _letters(text: str) -> str:
     """Letters and digits of a name, whatever separates them."""

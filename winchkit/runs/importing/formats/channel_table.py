@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.names import meaning_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.units.spelling import read_unit, split_unit
 
 _VALUE = re.compile(
@@ -55,16 +55,9 @@ def by_channel(table: ColumnTable) -> ColumnTable:
         for name in found
         for item in _columns(parts, name, np.flatnonzero(names == name), start)
     ]
-    note = f"each row is one value of one channel, by column '{parts.key.source}': " + ", ".join(
-        found
-    )
-    return replace(
-        table,
-        columns=named_apart(columns),
-        line_of=lambda _row: None,
-        interval=None,
-        notes=(*table.notes, note),
-    )
+    names_found = ", ".join(found)
+    note = f"each row is one value of one channel, by column '{parts.key.source}': {names_found}"
+    return table.rearranged(columns, note)
 
 
 def _common_start(names: Sequence[str]) -> int:
