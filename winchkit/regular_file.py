@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from winchkit.errors import Fault, FileError
@@ -36,6 +38,15 @@ def regular(path: str | os.PathLike[str], flags: int = os.O_RDONLY) -> int:
         os.close(descriptor)
         raise
     return descriptor
+
+
+@contextmanager
+def file_errors(path: str | os.PathLike[str], what: str = "written") -> Iterator[None]:
+    """Raise FileError, with the reason of the system, where a file cannot be ``what``."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(Fault(f"cannot be {what}: {error.strerror}", os.fspath(path))) from error
 
 
 def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:

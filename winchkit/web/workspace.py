@@ -27,8 +27,9 @@ from winchkit.diagnosis.plan import plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import write_wave_on_drum
-from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.errors import FileError, UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
+from winchkit.regular_file import file_errors
 from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
@@ -474,10 +475,8 @@ class DiagnoseView:
 
     @staticmethod
     def _made(folder: Path) -> Path:
-        try:
+        with file_errors(folder, "made"):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
         return folder
 
     def _use(self, name: str, *, used: bool) -> None:

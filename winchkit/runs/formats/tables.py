@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from winchkit.errors import Fault, FileError
 from winchkit.extras import library
+from winchkit.regular_file import file_errors
 from winchkit.runs.log import Log
 from winchkit.runs.run import Run
 
@@ -29,10 +29,8 @@ def write_mf4(log: Log, path: str | Path) -> None:
             ]
             mdf.append(signals, acq_name=source.topic, common_timebase=True)
         mdf.header.comment = "\n".join(f"{key}: {value}" for key, value in log.metadata.items())
-        try:
+        with file_errors(path):
             mdf.save(Path(path), overwrite=True)
-        except OSError as error:
-            raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
 
 
 def write_parquet(run: Run, path: str | Path) -> None:
@@ -41,8 +39,5 @@ def write_parquet(run: Run, path: str | Path) -> None:
     from pyarrow import parquet
 
     table = run.to_arrow()
-    try:
-        with Path(path).open("wb") as stream:
-            parquet.write_table(table, stream, compression="zstd")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
+    with file_errors(path), Path(path).open("wb") as stream:
+        parquet.write_table(table, stream, compression="zstd")

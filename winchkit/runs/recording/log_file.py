@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from winchkit.errors import Fault, FileError, UsageError
-from winchkit.regular_file import regular
+from winchkit.regular_file import file_errors, regular
 from winchkit.runs.recording.rotation import parts_beside
 
 _BUFFER = 1 << 20
@@ -42,10 +42,8 @@ class Lock(Enum):
 def create(path: Path, *, replace: bool) -> BinaryIO:
     """Create and lock a file that is empty or may be replaced; raises UsageError, FileError."""
     place = Path(os.path.realpath(path))
-    try:
+    with file_errors(path):
         return _created(place, path, replace=replace)
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
 
 
 def begin_log(path: Path, first: Path, *, replace: bool) -> BinaryIO:
@@ -65,7 +63,8 @@ def begin_log(path: Path, first: Path, *, replace: bool) -> BinaryIO:
             held.close()  # an open file cannot be removed there
         for item in earlier:
             if item != first:
-                _remove(item)
+                with file_errors(item, "replaced"):
+                    item.unlink()
         held.close()
         return create(first, replace=replace)
 
@@ -158,13 +157,6 @@ def _require_same(descriptor: int, place: Path, path: Path) -> None:
         same = False
     if not same:
         raise _being_written(path)
-
-
-def _remove(item: Path) -> None:
-    try:
-        item.unlink()
-    except OSError as error:
-        raise FileError(Fault(f"cannot be replaced: {error.strerror}", str(item))) from None
 
 
 def lock_file(descriptor: int) -> Lock:
