@@ -339,12 +339,12 @@ def _blocks(table: ColumnTable, clocks: Sequence[ChannelCandidate]) -> list[list
     used = {item.column.number for item in clocks}
     for item in sorted(clocks, key=lambda c: c.column.number):
         before = blocks[-1][-1].column.number if blocks else 0
-        between = [
-            column
+        is_between = any(
+            before < column.number < item.column.number and column.number not in used
             for column in table.columns
-            if before < column.number < item.column.number and column.number not in used
-        ]
-        if blocks and not any(np.any(np.isfinite(column.values)) for column in between):
+            if np.any(np.isfinite(column.values))
+        )
+        if blocks and not is_between:
             blocks[-1].append(item)
         else:
             blocks.append([item])

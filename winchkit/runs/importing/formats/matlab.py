@@ -137,9 +137,8 @@ def read_hdf5(path: str, data: bytes) -> ColumnTable:
         sets: dict[str, Any] = {}
 
         def visit(name: str, item: Any) -> None:
-            is_internal = name.startswith("#")
-            is_elsewhere = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
-            if isinstance(item, h5py.Dataset) and not is_internal and not is_elsewhere:
+            is_set = isinstance(item, h5py.Dataset)
+            if is_set and not name.startswith("#") and not (item.external or item.is_virtual):
                 sets[name.replace("/", ".")] = item
 
         source.visititems(visit)
