@@ -1,7 +1,4 @@
-"""Writing of fitted effects into a copy of a profile file, with the origin of their values.
-
-Only refitted values change, a new effect is appended to the effects, and the ledger gets an entry.
-"""
+"""Writing of fitted effects into a copy of a profile file, with the origin of their values."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
 """Reader of MCAP files of other programs: messages in JSON, and of ROS 2 (extra ``ros2``).
 
-Every topic is a group of columns with its own times, of its recorder and of its source; fields are
-named by their path, elements of arrays by their index, joints of a JointState by their name.
+Every topic is a group of columns with its own times, of its recorder and of its source.
 """
 
 from __future__ import annotations
