@@ -42,10 +42,7 @@ _LONGEST_VALUE = 40
 
 
 def require_type(value: object, kind: type | tuple[type, ...], name: str) -> None:
-    """Raise UsageError unless a value is of a type.
-
-    Raises UsageError with the argument, the value and the call that returns such an object.
-    """
+    """Raise UsageError unless a value is of a type; it names the call that returns such a value."""
     if isinstance(value, kind):
         return
     kinds = kind if isinstance(kind, tuple) else (kind,)
@@ -56,11 +53,7 @@ def require_type(value: object, kind: type | tuple[type, ...], name: str) -> Non
 
 
 def require_types(values: object, kind: type | tuple[type, ...], name: str) -> None:
-    """Raise UsageError unless values are a sequence, such as a list, of objects of a type.
-
-    ``values``: argument of a call; an empty sequence is accepted. Raises UsageError with the
-    argument, the first wrong value and the call that returns such an object.
-    """
+    """Raise UsageError unless values are a sequence, such as a list, of objects of a type."""
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(values, Sequence) or isinstance(values, str | bytes):
         expected = " or ".join(one.__name__ for one in kinds)
@@ -72,20 +65,14 @@ def require_types(values: object, kind: type | tuple[type, ...], name: str) -> N
 
 
 def require_each(winches: object, kind: type, name: str) -> None:
-    """Raise UsageError unless an argument maps names to sequences of objects of a type.
-
-    Raises UsageError with the argument, the first wrong value and what to pass.
-    """
+    """Raise UsageError unless an argument maps names to sequences of objects of a type."""
     found = require_mapping(winches, name, f"lists of {kind.__name__} by winch")
     for key, values in found.items():
         require_types(values, kind, f"{name}[{key!r}]")
 
 
 def require_mapping(values: object, name: str, what: str) -> Mapping[Any, Any]:
-    """The argument where it is a mapping, such as a dict; ``what``: contents of the one to pass.
-
-    Raises UsageError with the argument and its value.
-    """
+    """The argument where it is a mapping of ``what``; else raises UsageError."""
     if isinstance(values, Mapping):
         return values
     raise UsageError(f"{name} is {_shown(values)}; pass a dict of {what}")
@@ -98,20 +85,14 @@ def require_sequence(values: object, name: str, what: str) -> None:
 
 
 def path_of(value: object, name: str = "path") -> Path:
-    """Argument that names a file or a folder.
-
-    Raises UsageError for anything that is neither text nor a path.
-    """
+    """Argument that names a file or a folder; UsageError for what is no text and no path."""
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise UsageError(f"{name} is {_shown(value)}; pass the path of a file or folder")
     return Path(value)
 
 
 def number(call: str, name: str, value: object) -> float:
-    """Argument that is a finite number, in SI.
-
-    Raises UsageError for text, None, True, and for what is not finite.
-    """
+    """Argument that is a finite number, in SI; UsageError also for text, None and True."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise UsageError(f"{call}: {name} is {_shown(value)}; pass a number in SI units")
     if not math.isfinite(value):
@@ -120,10 +101,7 @@ def number(call: str, name: str, value: object) -> float:
 
 
 def positive(call: str, name: str, value: object, most: float = math.inf) -> float:
-    """Argument that is a number above zero, in SI.
-
-    Raises UsageError for anything else, and for what is larger.
-    """
+    """Argument that is a number above zero and at most ``most``, in SI; else UsageError."""
     found = number(call, name, value)
     if found <= 0:
         raise UsageError(f"{call}: {name}={found:g} is not a positive number")

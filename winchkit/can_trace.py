@@ -69,11 +69,7 @@ class CanTrace:
 
 
 def is_can_trace(lines: Sequence[str]) -> bool:
-    """Whether lines of text are frames of a CAN bus.
-
-    ``lines``: the first lines of a file. Returns: True where at least 70 % of the lines from the
-    first frame on are frames.
-    """
+    """Whether 70 % of a file's first lines, from the first frame on, are frames of a CAN bus."""
     filled = [line.strip() for line in islice(lines, _SAMPLED) if line.strip()]
     head = csv_head(filled)
     readers = (*READERS.values(), general, *(() if head is None else (head.read,)))
@@ -101,10 +97,9 @@ def is_trace(data: bytes) -> bool:
 
 
 def read_trace(path: str | Path) -> CanTrace:
-    """Read the data frames of a trace.
+    """Read the data frames of a trace; remote and error frames are counted in the notes.
 
-    Returns: frames in the order of the file, with times in s. Remote and error frames are counted
-    in the notes. Raises FileError for a file that cannot be read, and for one without frames.
+    Raises FileError for a file that cannot be read, and for one without frames.
     """
     name = str(path)
     data = read_whole(Path(path), "trace of CAN frames", LARGEST)

@@ -18,9 +18,13 @@ A message says what, where, the value, the limit, and what to do.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 CONTROL_CHARACTERS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u180e\u200b-\u200f"
@@ -117,6 +121,22 @@ class NotPermitted(MotionError):
     """A condition for motion is not met, e.g. no drive-side watchdog."""
 
 
+def of_each(
+    read: Callable[[_Item], _Result], items: Iterable[_Item], kind: type[FileError] = FileError
+) -> list[_Result]:
+    """``read`` of every item; raises one error of a ``kind`` with the faults of all items."""
+    found: list[_Result] = []
+    faults: list[Fault] = []
+    for item in items:
+        try:
+            found.append(read(item))
+        except FileError as error:
+            faults += error.faults
+    if faults:
+        raise kind(faults)
+    return found
+
+
 def class_name(error: WinchkitError) -> str:
     """Name of the public class of an error, which another process has too."""
     return next(c.__name__ for c in type(error).__mro__ if c.__module__ == __name__)
@@ -145,10 +165,7 @@ def _escaped(found: re.Match[str]) -> str:
 
 
 def suggest(word: str, known: list[str]) -> str:
-    """``; did you mean 'x'?`` when a known word is close, else nothing.
-
-    Where the word is a part of several names, such as ``creep``, all of them are given.
-    """
+    """``; did you mean 'x'?`` for close names and those that contain the word, else nothing."""
     folded = word.casefold()
     close = [name for name in known if name.casefold() == folded]
     if not close:

@@ -215,10 +215,7 @@ _FIGURES = ("method", "data", "n_observations", "n_unknowns", "dof", "chi_square
 
 
 def correlations_of(names: Sequence[str], covariance: Any) -> tuple[Correlation, ...]:
-    """Correlations above 0.5 in size, largest first.
-
-    ``names``: of the q values. ``covariance`` (q, q).
-    """
+    """Correlations above 0.5 in size, largest first, of a covariance (q, q)."""
     std = [sqrt(max(float(covariance[i, i]), 0.0)) for i in range(len(names))]
     pairs = [
         Correlation(a, names[j], float(covariance[i, j]) / (std[i] * std[j]))

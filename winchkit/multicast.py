@@ -33,10 +33,7 @@ _SENDER = 0xFFF00000 + 12
 
 
 class MulticastPort:
-    """An open group; raises OSError, ImportError without msgpack, ValueError for no address.
-
-    ``group``: IPv4 or IPv6 address.
-    """
+    """An open group; raises OSError, ImportError without msgpack, ValueError for no address."""
 
     def __init__(self, group: str, port: int) -> None:
         import msgpack
@@ -93,10 +90,7 @@ class MulticastPort:
         self._output.sendto(self._pack(frame), self._group)
 
     def receive(self, timeout: float) -> tuple[int, bytes] | None:
-        """Take the next data frame of 11 bits of another sender, if one comes within ``timeout`` s.
-
-        Raises OSError, and ValueError for a datagram that is no frame.
-        """
+        """Next data frame of 11 bits within ``timeout`` s; OSError, ValueError for no frame."""
         try:
             datagram, ancillary, sender = self._taken()
         except BlockingIOError:

@@ -11,13 +11,7 @@ import sys
 
 
 def import_python_can() -> None:
-    """Import ``can``, if it is not imported yet, as without asammdf.
-
-    Notes
-    -----
-    The MF4 reader and writer of python-can are then not available in the process. A program that
-    uses them imports ``can`` before winchkit.
-    """
+    """Import ``can`` as without asammdf; a program that uses its MF4 imports it before winchkit."""
     if "can" in sys.modules or "asammdf" in sys.modules:
         return
     sys.modules["asammdf"] = None  # type: ignore[assignment]  # import raises ImportError

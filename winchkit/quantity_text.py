@@ -16,10 +16,7 @@ _Ladder = tuple[tuple[float, str, float], ...]
 
 
 def _prefixed(unit: str) -> _Ladder:
-    """Prefixes of a unit, so that a value has at most three digits before its point.
-
-    A speed of 1570 rad/s keeps its unit; kN m and kN s/m are usual.
-    """
+    """Prefixes of a unit for at most three digits before the point; those of kN m are usual."""
     small = (1e-4, f"µ{unit}", 1e-6), (0.1, f"m{unit}", 1e-3)
     if unit.startswith("N"):
         return *small, (1e3, unit, 1.0), (_ANY, f"k{unit}", 1e3)
@@ -63,10 +60,10 @@ class PrintScale:
             return "unknown"
         return self.labelled(significant(value / self.worth, digits))
 
-    def span(self, low: float, high: float | None, digits: int = 3) -> str:
+    def span(self, low: float, high: float | None) -> str:
         """Two values with one unit: ``0.084 to 0.334 N m``; one value where both are equal."""
-        first, last = self.text(low, digits), self.text(low if high is None else high, digits)
-        return last if first == last else f"{significant(low / self.worth, digits)} to {last}"
+        first, last = self.text(low), self.text(low if high is None else high)
+        return last if first == last else f"{significant(low / self.worth)} to {last}"
 
     def labelled(self, number: str) -> str:
         """A formatted number followed by the unit."""
@@ -87,19 +84,12 @@ def scale_for(sizes: float | Sequence[float], unit: str) -> PrintScale:
 
 
 def quantity(value: float, unit: str, digits: int = 3) -> str:
-    """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``.
-
-    ``value``: SI value. ``unit``: SI unit. Returns: number with unit.
-    """
+    """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``."""
     return scale_for(value, unit).text(value, digits)
 
 
 def with_std(value: float, std: float, unit: str, scale: PrintScale | None = None) -> str:
-    """Value and standard deviation, the latter to two digits: ``247.4 ± 6.1 kN``.
-
-    Without a deviation (NaN or zero) the value alone, to three digits. The scale is that of the
-    value unless another one is given.
-    """
+    """Value and standard deviation, the latter to two digits: ``247.4 ± 6.1 kN``."""
     if not isfinite(value) or not isfinite(std) or std <= 0:
         return (scale or scale_for(value, unit)).text(value)
     scale = scale or scale_for((value, std), unit)
@@ -112,10 +102,7 @@ def with_std(value: float, std: float, unit: str, scale: PrintScale | None = Non
 
 
 def percent(share: float) -> str:
-    """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN.
-
-    ``share``: share, 0 to 1. Returns: number with ``%``.
-    """
+    """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN."""
     if isnan(share):
         return "unknown"
     shown = 100 * share
@@ -139,10 +126,7 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def between(low: float, high: float, unit: str, scale: PrintScale | None = None) -> str:
-    """An SI interval with two digits of its width: ``236 to 259 kN``; one end: ``above 236 kN``.
-
-    The scale is that of the larger end unless another one is given.
-    """
+    """An SI interval with two digits of its width: ``236 to 259 kN``; one end: ``above 236 kN``."""
     known = [end for end in (low, high) if isfinite(end)]
     if not known:
         return "any value"

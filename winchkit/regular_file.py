@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from winchkit.errors import Fault, FileError
@@ -38,6 +40,15 @@ def regular(path: str | os.PathLike[str], flags: int = os.O_RDONLY) -> int:
     return descriptor
 
 
+@contextmanager
+def file_errors(path: str | os.PathLike[str], what: str = "written") -> Iterator[None]:
+    """Raise FileError, with the reason of the system, where a file cannot be ``what``."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(Fault(f"cannot be {what}: {error.strerror}", os.fspath(path))) from error
+
+
 def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
     """Text of a regular file; raises OSError, UnicodeDecodeError."""
     with open(path, encoding=encoding, opener=regular) as file:
@@ -47,10 +58,7 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
 def read_whole(
     path: Path, what: str, largest: int | None = None, error: type[FileError] = FileError
 ) -> bytes:
-    """Content of a regular file, ``what`` in messages; raises ``error`` where it cannot be read.
-
-    Of a file that is larger than ``largest`` (bytes) one byte more.
-    """
+    """Content of a regular file, at most ``largest`` and one bytes; else raises ``error``."""
     try:
         with open(path, "rb", opener=regular) as file:
             return file.read() if largest is None else file.read(largest + 1)

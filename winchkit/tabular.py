@@ -95,10 +95,7 @@ class Tabular(ABC):
 
 
 def arrow_of(table: Any) -> pa.Table:
-    """Arrow table of a table in memory: of pandas, Polars, pyarrow or any Arrow C stream.
-
-    Raises UsageError for an object that is no table, or without pyarrow.
-    """
+    """Arrow table of pandas, Polars, pyarrow or any Arrow C stream; UsageError for others."""
     pa = library("pyarrow", "Arrow")
     if hasattr(table, "reset_index") and hasattr(table, "attrs"):
         units = table.attrs.get("units", {})

@@ -87,10 +87,7 @@ def convert(value: float, unit: str, dimension: str) -> float:
 
 
 def number_and_unit(text: str) -> tuple[float, str] | None:
-    """Split ``"60 mm"`` or ``"60mm"``; the unit is empty where there is none.
-
-    Returns: number in that unit, and the unit; None for a text that does not start with a number.
-    """
+    """Split ``"60 mm"`` or ``"60mm"``, the unit may be empty; None for no number at the start."""
     found = _QUANTITY.fullmatch(text.strip())
     return (float(found[1]), found[2]) if found else None
 

@@ -43,6 +43,21 @@ servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute"
 cell = { device = "laumas-tlb", bus = "cells", unit = 1 }
 limits = { speed = "0.5 m/s" }
 """
+ONE_WINCH = """\
+schema = 1
+kind = "bench"
+cycle = "4 ms"
+[bus.can]
+kind = "can"
+interface = "virtual"
+channel = "one-winch"
+[winch.A]
+profile = "bench-spiral"
+servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
+[winch.A.limits]
+speed = "0.5 m/s"
+acceleration = "1 m/s^2"
+"""
 
 
 def faults_of(path: Path, text: str) -> list[tuple[int | None, str, str]]:

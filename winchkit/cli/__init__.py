@@ -24,107 +24,59 @@ from winchkit.version import __version__
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
+
+def _at(module: str, words: str, name: str = "command") -> CommandPlace:
+    return CommandPlace(f"winchkit.cli.{module}", words, name)
+
+
 SECTIONS: dict[str, dict[str, CommandPlace]] = {
     "Model and runs": {
-        "demo": CommandPlace(
-            "winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."
-        ),
-        "compare": CommandPlace(
-            "winchkit.cli.model.compare",
-            "Compare runs with a model: its errors, by variable.",
-        ),
-        "diagnose": CommandPlace(
-            "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
-        ),
-        "add": CommandPlace("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
-        "forward": CommandPlace(
-            "winchkit.cli.model.forward", "Simulate a profile's motion under a torque or loops."
-        ),
-        "remove": CommandPlace(
-            "winchkit.cli.model.add", "Remove an effect from a profile.", "remove"
-        ),
-        "undo": CommandPlace(
-            "winchkit.cli.model.ledger", "Undo the last add or remove of a profile.", "undo"
-        ),
-        "ledger": CommandPlace(
-            "winchkit.cli.model.ledger",
-            "List the changes of a profile, with their errors.",
-        ),
-        "serve": CommandPlace(
-            "winchkit.cli.web.serve",
-            "Serve the page in the browser: all of this, with figures.",
-        ),
-        "profile": CommandPlace(
-            "winchkit.cli.model.profile", "Write the profile of a winch of your own."
-        ),
-        "plan": CommandPlace("winchkit.cli.model.plan", "Propose the next motion programme."),
-        "effects": CommandPlace(
-            "winchkit.cli.model.effects", "List the physical effects, or describe one."
-        ),
-        "size": CommandPlace(
-            "winchkit.cli.model.size", "Size a winch: compare each requirement with its limit."
-        ),
+        "demo": _at("sim.demo", "Find a hidden effect on a simulated bench, start to end."),
+        "compare": _at("model.compare", "Compare runs with a model: its errors, by variable."),
+        "diagnose": _at("model.diagnose", "Name the physical effect that the model lacks."),
+        "add": _at("model.add", "Fit an effect and write it into a profile."),
+        "forward": _at("model.forward", "Simulate a profile's motion under a torque or loops."),
+        "remove": _at("model.add", "Remove an effect from a profile.", "remove"),
+        "undo": _at("model.ledger", "Undo the last add or remove of a profile.", "undo"),
+        "ledger": _at("model.ledger", "List the changes of a profile, with their errors."),
+        "serve": _at("web.serve", "Serve the page in the browser: all of this, with figures."),
+        "profile": _at("model.profile", "Write the profile of a winch of your own."),
+        "plan": _at("model.plan", "Propose the next motion programme."),
+        "effects": _at("model.effects", "List the physical effects, or describe one."),
+        "size": _at("model.size", "Size a winch: compare each requirement with its limit."),
     },
     "Bench": {
-        "commission": CommandPlace(
-            "winchkit.cli.bench.commission",
-            "Commission a bench: test, confirm, record.",
+        "commission": _at("bench.commission", "Commission a bench: test, confirm, record."),
+        "jog": _at("bench.jog", "Move a winch by hand."),
+        "move": _at("bench.move", "Move one winch, or all, to a cable length."),
+        "hold-tension": _at(
+            "bench.hold_tension", "Keep the tension of a cable by the winch's speed."
         ),
-        "jog": CommandPlace("winchkit.cli.bench.jog", "Move a winch by hand."),
-        "move": CommandPlace(
-            "winchkit.cli.bench.move", "Move one winch, or all, to a cable length."
-        ),
-        "hold-tension": CommandPlace(
-            "winchkit.cli.bench.hold_tension", "Keep the tension of a cable by the winch's speed."
-        ),
-        "home": CommandPlace(
-            "winchkit.cli.bench.home", "Find the drive's zero, or define the present length."
-        ),
-        "run": CommandPlace("winchkit.cli.bench.run", "Execute a motion programme and log it."),
-        "stop": CommandPlace("winchkit.cli.bench.stop", "Stop every winch of a bench, now."),
-        "reset": CommandPlace(
-            "winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."
-        ),
-        "monitor": CommandPlace("winchkit.cli.bench.monitor", "Show a bench live."),
-        "log": CommandPlace("winchkit.cli.log.log", "Log a bench; inspect, recover, replay logs."),
-        "tare": CommandPlace("winchkit.cli.bench.tare", "Tare a load cell."),
+        "home": _at("bench.home", "Find the drive's zero, or define the present length."),
+        "run": _at("bench.run", "Execute a motion programme and log it."),
+        "stop": _at("bench.stop", "Stop every winch of a bench, now."),
+        "reset": _at("bench.reset", "Clear trips and drive faults; nothing is enabled."),
+        "monitor": _at("bench.monitor", "Show a bench live."),
+        "log": _at("log.log", "Log a bench; inspect, recover, replay logs."),
+        "tare": _at("bench.tare", "Tare a load cell."),
     },
     "Devices": {
-        "cell": CommandPlace(
-            "winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."
-        ),
-        "scan": CommandPlace("winchkit.cli.drive.scan", "List the nodes of a CAN bus."),
-        "info": CommandPlace(
-            "winchkit.cli.drive.info", "Show identity, state and limits of a drive."
-        ),
-        "config": CommandPlace(
-            "winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."
-        ),
-        "lss": CommandPlace(
-            "winchkit.cli.drive.lss", "Set node number and bit rate of a drive (CiA 305)."
-        ),
-        "busload": CommandPlace(
-            "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
-        ),
+        "cell": _at("cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
+        "scan": _at("drive.scan", "List the nodes of a CAN bus."),
+        "info": _at("drive.info", "Show identity, state and limits of a drive."),
+        "config": _at("drive.config", "Drive settings: save, load, diff, store, restore."),
+        "lss": _at("drive.lss", "Set node number and bit rate of a drive (CiA 305)."),
+        "busload": _at("drive.busload", "CAN load of a bench, and the fastest SYNC that fits."),
     },
     "Files and simulation": {
-        "check": CommandPlace(
-            "winchkit.cli.files.check", "Check files of any kind and list every fault."
+        "check": _at("files.check", "Check files of any kind and list every fault."),
+        "import": _at(
+            "files.import_logs", "Import recordings of other programs: channels and units."
         ),
-        "import": CommandPlace(
-            "winchkit.cli.files.import_logs",
-            "Import recordings of other programs: channels and units.",
-        ),
-        "export": CommandPlace(
-            "winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."
-        ),
-        "export-model": CommandPlace(
-            "winchkit.cli.files.export_model", "Write a profile as C, Python, MuJoCo or JSON."
-        ),
-        "sim": CommandPlace("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
-        "completion": CommandPlace(
-            "winchkit.cli.files.completion", "Print the completion script of a shell."
-        ),
+        "export": _at("files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
+        "export-model": _at("files.export_model", "Write a profile as C, Python, MuJoCo or JSON."),
+        "sim": _at("sim.group", "Simulated benches: record, serve, list."),
+        "completion": _at("files.completion", "Print the completion script of a shell."),
     },
 }
 """The core's commands by subject, as ``--help`` lists them; those of the wings follow."""

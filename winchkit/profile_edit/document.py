@@ -10,7 +10,7 @@ from tomlkit.exceptions import ParseError
 from tomlkit.items import AoT
 
 from winchkit.errors import Fault, FileError
-from winchkit.regular_file import read_text
+from winchkit.regular_file import file_errors, read_text
 from winchkit.runs.files import refuse_existing
 from winchkit.schema.profiles.winch import SHORTHANDS
 from winchkit.units import format_quantity
@@ -19,9 +19,8 @@ from winchkit.units import format_quantity
 def read_document(path: Path) -> Any:
     """Parse a profile with its comments and layout. Raises FileError."""
     try:
-        return tomlkit.parse(read_text(path))
-    except OSError as error:
-        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from error
+        with file_errors(path, "read"):
+            return tomlkit.parse(read_text(path))
     except (ParseError, UnicodeDecodeError) as error:
         raise FileError(Fault(f"is not TOML: {error}", str(path))) from error
 
@@ -38,10 +37,8 @@ def write_document(document: Any, path: Path) -> None:
     for name in ("effect", "ledger"):
         if name in document and not len(document[name]):
             del document[name]
-    try:
+    with file_errors(path):
         path.write_text(tomlkit.dumps(document), encoding="utf-8")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
 
 
 def tables(document: Any, name: str) -> AoT:

@@ -1,7 +1,4 @@
-"""Writing of fitted effects into a copy of a profile file, with the origin of their values.
-
-Only refitted values change, a new effect is appended to the effects, and the ledger gets an entry.
-"""
+"""Writing of fitted effects into a copy of a profile file, with the origin of their values."""
 
 from __future__ import annotations
 
@@ -45,12 +42,7 @@ class FittedTerm:
 def write_fitted(
     source: Path, fitted: Sequence[FittedTerm], out: Path, judged: Judged, *, replace: bool
 ) -> None:
-    """Copy the profile ``source`` to ``out`` with fitted effects, the last one new.
-
-    Raises FileError where a file cannot be read or written.
-
-    ``source``, ``out``: the profile, and its copy.
-    """
+    """Copy a profile with fitted effects, the last one new; raises FileError."""
     refuse_other(source, out, replace)
     document = read_document(source)
     note(document, "add", fitted[-1].term.effect.id, judged)
@@ -67,13 +59,7 @@ def write_without(
     *,
     replace: bool,
 ) -> None:
-    """Copy the profile ``source`` to ``out`` without an effect, the others as fitted.
-
-    A robot's effect on one line is ``EFFECT/LINE``. Raises FileError where the profile has no such
-    effect or a file cannot be read or written.
-
-    ``source``, ``out``: the profile, and its copy.
-    """
+    """Copy a profile without an effect (on one line ``EFFECT/LINE``); raises FileError."""
     refuse_other(source, out, replace)
     document = read_document(source)
     short = {SHORTHANDS[key]: key for key in shorthands(document)}
@@ -159,10 +145,7 @@ def _of_lines(table: Any) -> bool:
 
 
 def _update_shorthand(document: Any, item: FittedTerm) -> bool:
-    """Write a refitted value to its shorthand key; False where the profile has no such key.
-
-    For an infinite value (a rigid cable) the key is removed.
-    """
+    """Write a refitted value to its shorthand key, remove it if infinite; False without the key."""
     effect = item.term.effect
     key = next((key for key in shorthands(document) if SHORTHANDS[key] == effect.id), None)
     if key is None:

@@ -17,10 +17,7 @@ from winchkit.report.words.sentence import changes_text, sentence
 
 
 def report_json(answer: Answer) -> dict[str, Any]:
-    """A diagnosis as ``winchkit diagnose --json`` prints it.
-
-    Returns: values in SI.
-    """
+    """A diagnosis as ``winchkit diagnose --json`` prints it, in SI."""
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
     if (by_wing := wings.call("json", answer)) is not None:
         drawn = by_wing(answer)

@@ -7,7 +7,7 @@ from winchkit.quantity_text import percent, quantity, scale_for
 from winchkit.report.figures.maps import largest_text, map_text, signed
 from winchkit.report.words.headline import at_noise, worst_outputs
 from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
+from winchkit.report.words.vocabulary import listed, output_name, variable_name
 
 HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
 _FOLLOWED = 3
@@ -27,15 +27,12 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
         noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
         sizes = [scale.text(v) for v in (error.rms, _noticeable(error.bias, error.rms), error.max)]
         signal = quantity(error.signal_rms, error.unit)
-        rows.append([OUTPUT_NAMES.get(name, name), *sizes, noise, signal])
+        rows.append([output_name(name), *sizes, noise, signal])
     return rows
 
 
 def short_rows(comparison: Comparison) -> list[list[str]]:
-    """Per output its error and noise, and its share of what the output varies.
-
-    The length of a cable varies by metres: a share of it says nothing and is left out.
-    """
+    """Per output its error and noise, and, but of a length, the share of what the output varies."""
     rows = [["error, rms", "", "noise", "of what it varies"]]
     for name in worst_outputs(comparison.outputs):
         error = comparison.outputs[name]
@@ -43,7 +40,7 @@ def short_rows(comparison: Comparison) -> list[list[str]]:
         noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
         is_known = name not in _LENGTHS and error.variation > 0.0
         share = percent(error.rms / error.variation) if is_known else ""
-        rows.append([OUTPUT_NAMES.get(name, name), scale.text(error.rms), noise, share])
+        rows.append([output_name(name), scale.text(error.rms), noise, share])
     return rows
 
 
@@ -61,15 +58,14 @@ def failing(comparison: Comparison) -> list[str]:
             parts.append(f"mean {signed(error.bias, scale)}")
         if name in drawn:
             parts.append(largest_text(drawn[name], scale))
-        lines.append(f"{OUTPUT_NAMES.get(name, name)} {'; '.join(parts)}")
+        lines.append(f"{output_name(name)} {'; '.join(parts)}")
     return lines[:_FAILING]
 
 
 def followed(error: OutputError, most: int = _FOLLOWED) -> str:
     """``load 82 % and time 10 %; 5 periods per drum turn 47 %``; ``most`` variables."""
     shares = [
-        f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
-        for variable, share in error.follows[:most]
+        f"{variable_name(variable)} {percent(share)}" for variable, share in error.follows[:most]
     ]
     texts = [listed(shares)] if shares else []
     texts += [f"{often_per_turn(a, order)} {percent(s)}" for a, order, s in _clear(error)]
@@ -81,7 +77,7 @@ def map_lines(comparison: Comparison) -> list[str]:
     out: dict[str, str] = {}
     for drawn in comparison.maps:
         error = comparison.outputs[drawn.output]
-        name = OUTPUT_NAMES.get(drawn.output, drawn.output)
+        name = output_name(drawn.output)
         text = map_text(drawn, scale_for(3 * error.rms, error.unit))
         out.setdefault(drawn.output, f"{name} {text}")
     return list(out.values())

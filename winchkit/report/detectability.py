@@ -68,10 +68,7 @@ def visible(answer: Answer) -> list[Visible]:
 
 
 def _on_any_line(rows: Sequence[Visible], elsewhere: bool) -> Visible:
-    """The row of the line with the largest detectable size, for all lines of a robot.
-
-    ``elsewhere``: whether the same effect may be on one line and on all lines equally.
-    """
+    """The row of the line with the largest detectable size, for all lines of a robot."""
     worst = max(rows, key=lambda row: (isnan(row.share), row.share))
     name, _, line = worst.effect.partition("/")
     if not line:
@@ -99,10 +96,7 @@ def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
 
 
 def useful_candidates(diagnosis: Diagnosis) -> list[CandidateScore]:
-    """Candidates with evidence that lower the errors above the noise by a tenth, best first.
-
-    One that was not fitted is judged by its evidence alone.
-    """
+    """Candidates with evidence that lower the errors above the noise by a tenth, best first."""
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
     before = {name: output.heldout_rms_before for name, output in diagnosis.outputs.items()}
     most = _LOWERED * excess(before, noise)

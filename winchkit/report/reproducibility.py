@@ -12,6 +12,7 @@ from typing import Any
 from winchkit import wings
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.report.html.markup import Markup, compact, details, element, folded, table
+from winchkit.report.words.vocabulary import runs_listed
 
 _FEW = 3
 """Runs that a command names; more are written with a wildcard."""
@@ -34,12 +35,7 @@ class CommandLine:
     @property
     def source(self) -> str:
         """Profile, runs and version, as figures print them."""
-        names = self.dataset.run_names
-        runs = (
-            ", ".join(names)
-            if len(names) <= _FEW
-            else f"{len(names)} runs, {names[0]} to {names[-1]}"
-        )
+        runs = runs_listed(self.dataset.run_names, _FEW)
         return f"profile {self.profile}; {runs}; winchkit {version('winchkit')}"
 
     def compare(self, profile: str) -> str:

@@ -44,10 +44,7 @@ def _meaning(errors: Sequence[SimulatedError]) -> list[str]:
 
 
 def refit_lines(fitted: MotionFit | None) -> list[str]:
-    """Error of the simulated motion before and after its values were refitted to it, if they were.
-
-    Returns: lines of at most 80 characters.
-    """
+    """Error of the simulated motion before and after its values were refitted to it, if any."""
     if fitted is None:
         return []
     errors = (fitted.rms_before, fitted.rms_after)

@@ -28,13 +28,13 @@ from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
     clause,
     combination_text,
     error_scale,
     estimate_text,
     interval_text,
     listed,
+    output_name,
     parameter_name,
     values_text,
 )
@@ -55,7 +55,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
         output = diagnosis.outputs[name]
         scale = error_scale(output)
         last = output.heldout_rms_after if extended else output.heldout_rms_before
-        cells: list[str] = [OUTPUT_NAMES.get(name, name)]
+        cells: list[str] = [output_name(name)]
         cells.append(element("span", scale.text(output.heldout_rms_before), class_="before"))
         if extended:
             cells.append(element("span", scale.text(last), class_="after"))
@@ -72,10 +72,7 @@ def figures(diagnosis: Diagnosis) -> Markup:
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step that is reported, with its doubts.
-
-    ``without``: as in :func:`winchkit.report.text.step_lines`.
-    """
+    """Every step that is reported, with its doubts; ``without`` as in ``step_lines``."""
     errors = [*without, *[{}] * len(diagnosis.steps)]
     items = []
     for index in reported_steps(diagnosis):
@@ -122,7 +119,7 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
             *(bar(errors[n], longest[n], o.noise_rms, error_scale(o)) for n, o in outputs.items()),
         ]
 
-    head = ["model", *(OUTPUT_NAMES.get(name, name) for name in outputs)]
+    head = ["model", *(output_name(name) for name in outputs)]
     caption = "Held-out error, rms, after each added effect. The vertical mark is the noise."
     out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
     if len(ladder.first) > 1:
@@ -142,10 +139,7 @@ def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
 def bar(
     error: float, longest: float, noise: float | None, scale: PrintScale, tone: str = ""
 ) -> Markup:
-    """A bar as a share of the longest, with a mark at the noise, and the value below.
-
-    ``tone`` is a colour of the page, else the table's own.
-    """
+    """A bar as a share of the longest, with a mark at the noise, and the value below."""
     colour = f";background:var(--{tone})" if tone else ""
     inside = [element("span", class_="fill", style=f"width:{_part(error, longest)}%{colour}")]
     if noise:
@@ -169,7 +163,7 @@ def candidates(answer: Answer) -> Markup:
     outputs = diagnosis.outputs
     scales = {name: error_scale(output) for name, output in outputs.items()}
     head = ["effect", "meaning", "evidence"]
-    head += [f"{OUTPUT_NAMES.get(n, n)} [{scale.label}]" for n, scale in scales.items()]
+    head += [f"{output_name(n)} [{scale.label}]" for n, scale in scales.items()]
     rows = [_candidate(candidate, scales) for candidate in ranked]
     caption = (
         "Evidence: reduction of χ² minus a penalty of ln n per parameter (BIC). 1 % false-alarm "

@@ -57,6 +57,7 @@ from winchkit.report.words.vocabulary import (
     combination_text,
     error_scale,
     interval_text,
+    output_name,
     parameter_name,
     values_text,
 )
@@ -81,22 +82,14 @@ _STEP_LINES = 12
 
 
 def report_text(answer: Answer, *, verbose: bool = False) -> str:
-    """A diagnosis as text.
-
-    Returns: lines of at most 80 characters, at most 29 unless ``verbose``.
-    """
+    """A diagnosis in lines of at most 80 characters, at most 29 unless ``verbose``."""
     diagnosis = answer.diagnosis
     limits = _limits(answer)
     notes = [note for note in diagnosis.notes if verbose or note not in limits]
     blocks = [
         head_lines(diagnosis),
         step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
-        error_lines(
-            diagnosis.outputs,
-            extended=bool(reported_steps(diagnosis)),
-            data=diagnosis.data,
-            offsets=diagnosis.run_offsets,
-        ),
+        diagnosed_errors(diagnosis),
         _remaining(answer, verbose=verbose),
         _changes(diagnosis),
         *_data(diagnosis, all_shares=verbose),
@@ -149,7 +142,7 @@ def step_lines(
     """Every step that is reported, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
-    from which further steps are named only. Returns: lines of at most 80 characters.
+    from which further steps are named only.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
@@ -168,10 +161,7 @@ def step_lines(
 
 
 def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
-    """A comparison as text: errors per output beside their noise, and where they fail.
-
-    Returns: text of at most 80 columns; with all tables where it is ``verbose``.
-    """
+    """A comparison as text: errors per output beside their noise, and where they fail."""
     blocks = [paragraph(f"{comparison_headline(comparison)}.")]
     if comparison.outputs and not verbose:
         lines = entries(failing(comparison))
@@ -185,8 +175,7 @@ def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
 def _tables(comparison: Comparison) -> list[list[str]]:
     """All figures of a comparison, with the attribution of its errors to variables."""
     attributed = entries(
-        f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
-        for name, error in comparison.outputs.items()
+        f"{output_name(name)}: {followed(error)}" for name, error in comparison.outputs.items()
     )
     blocks = [aligned([HEAD, *size_rows(comparison)])]
     if attributed:
@@ -199,10 +188,7 @@ def _tables(comparison: Comparison) -> list[list[str]]:
 
 
 def addition_text(addition: Addition | Removal) -> str:
-    """An added or removed effect as text: fitted values, and held-out errors.
-
-    Returns: text of at most 80 columns.
-    """
+    """An added or removed effect as text: fitted values, and held-out errors."""
     from winchkit.diagnosis.add import Addition
     from winchkit.report.simulated import refit_lines
 
@@ -217,25 +203,27 @@ def addition_text(addition: Addition | Removal) -> str:
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],
-        error_lines(addition.outputs, extended=True),
+        _errors(addition.outputs, extended=True),
         refit_lines(addition.motion) if isinstance(addition, Addition) else [],
         _notes(addition.notes),
     ]
     return joined(blocks)
 
 
-def error_lines(
+def diagnosed_errors(diagnosis: Diagnosis) -> list[str]:
+    """Held-out errors of a diagnosis."""
+    extended, offsets = bool(reported_steps(diagnosis)), diagnosis.run_offsets
+    return _errors(diagnosis.outputs, extended=extended, data=diagnosis.data, offsets=offsets)
+
+
+def _errors(
     outputs: Mapping[str, OutputFit],
     *,
     extended: bool,
     data: str = "runs",
     offsets: Sequence[RunOffset] = (),
 ) -> list[str]:
-    """Held-out errors per output as lines.
-
-    ``data``: kind of data, ``runs`` or ``poses``. ``offsets``: offsets that every run has for
-    itself, whether it is held out or not. Returns: lines of at most 80 characters.
-    """
+    """Held-out errors per output, of ``runs`` or ``poses``, with the offsets of each run."""
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():
@@ -243,13 +231,13 @@ def error_lines(
         noise = noise_text(output).removeprefix("noise ")
         after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
-        rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
+        rows.append([output_name(name), before, *after, noise])
     held_out = f"held out: measured on {data} that the fit had not seen"
     if extended:  # Then values with their deviations stand above.
         held_out = f"± one standard deviation; held out: on {data} that the fit had not seen"
     if not offsets:
         return [*aligned(rows), f"  ({held_out})"]
-    own = " and ".join(dict.fromkeys(OUTPUT_NAMES.get(o.output, o.output) for o in offsets))
+    own = " and ".join(dict.fromkeys(output_name(o.output) for o in offsets))
     held_out += f"; the offset of the {own} is estimated from every run itself"
     return [*aligned(rows), *paragraph(f"({held_out})", "  ", "   "), *_offsets(offsets)]
 
@@ -262,7 +250,7 @@ def _offsets(offsets: Sequence[RunOffset]) -> list[str]:
         scales[offset.output] = scale_for(sizes, offset.unit)
     for offset in offsets[:_MOST_OFFSETS]:
         value = with_std(offset.value, offset.std, offset.unit, scales[offset.output])
-        rows.append([offset.run, OUTPUT_NAMES.get(offset.output, offset.output), value])
+        rows.append([offset.run, output_name(offset.output), value])
     more = len(offsets) - len(rows)
     last = [f"  and {more} further in --json"] if more else []
     return ["", "offset of each run", *aligned(rows, words=2), *last]
@@ -280,7 +268,7 @@ def _ladder(answer: Answer) -> list[str]:
         *((f"only {name}", rms) for name, rms in ladder.first.items()),
         *((f"all but {name}", rms) for name, rms in ladder.last.items()),
     ]
-    rows = [["held-out error, rms", *(OUTPUT_NAMES.get(name, name) for name in scales)]]
+    rows = [["held-out error, rms", *(output_name(name) for name in scales)]]
     rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
     rows.append(["noise", *(noise_text(outputs[n]).removeprefix("noise ") for n in scales)])
     return ["contribution of each effect", *aligned(rows)]

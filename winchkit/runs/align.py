@@ -2,8 +2,7 @@
 
 A row is at a sample of the slowest instrument; every other signal is interpolated there between its
 two neighbouring samples, and is NaN without them. While that instrument is silent rows are at the
-samples of the other sources. A recorder of rows and a reader of a log by channels use the same
-code.
+samples of the other sources.
 """
 
 from __future__ import annotations
@@ -21,12 +20,7 @@ MAY_LACK = "motor_torque"
 
 
 def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Array:
-    """Linear interpolation of samples.
-
-    ``times`` (n,): strictly increasing times, s. ``values`` (n, k). ``moments`` (m,): times of the
-    result, s. ``max_gap``: longest interval over which samples are interpolated, s. Returns (m, k):
-    NaN where a neighbouring sample is missing or the interval is longer.
-    """
+    """Samples (n, k) interpolated at ``moments`` (m,); NaN across more than ``max_gap`` (s)."""
     found = np.full((len(moments), values.shape[1]), np.nan)
     if not len(times):
         return found
@@ -77,10 +71,7 @@ class Moments:
             self._others = np.concatenate([self._others, times])
 
     def take(self, now: float, *, ends: bool = False) -> Array:
-        """Times of rows that are known at ``now`` (s), strictly increasing.
-
-        Samples arrive within :data:`PATIENCE`; where the log ``ends`` all have arrived.
-        """
+        """Times of rows that are known at ``now`` (s): all where the log ``ends``."""
         known = self._newest if ends else now - PATIENCE
         found: list[Array] = []
         while len(self._picked):
@@ -209,8 +200,8 @@ class Aligner:
 
         A row waits for every source with a sample within the last half second. Where the log
         ``ends``, it waits neither for sources slower than the rows nor for one that has been
-        silent for longer than is interpolated; their values are then NaN. The first row is the
-        first complete one, or the first after half a second.
+        silent for longer than is interpolated. The first row is the first complete one, or the
+        first after half a second.
         """
         self._moments = np.concatenate([self._moments, self._picked.take(now, ends=ends)])
         left = self._slower if ends else ()

@@ -17,11 +17,7 @@ def is_real(values: object) -> bool:
 
 
 def real_numbers(name: str, values: object) -> Array:
-    """Array (n,) of a list, a masked array, a column of a table, or an array of another kind.
-
-    ``name``: of the argument. Returns: masked and missing values are NaN; true is 1. Raises
-    UsageError for text, dates, complex numbers and more than one dimension.
-    """
+    """Argument ``name`` as an array (n,), NaN where masked or missing; raises UsageError."""
     plain = np.ma.filled(values.astype(np.float64), np.nan) if _is_masked(values) else values
     found = np.asarray(plain)
     if found.dtype == object and found.ndim == 1:

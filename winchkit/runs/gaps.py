@@ -1,7 +1,4 @@
-"""Gaps of a recording: intervals in which samples were lost, or in which a channel has no value.
-
-All that counts gaps (``check``, ``log info``, an import, a run) counts these.
-"""
+"""Gaps of a recording, as ``check``, ``log info``, an import and a run count them."""
 
 from __future__ import annotations
 
@@ -20,10 +17,9 @@ _WHOLE = 0.05
 
 
 def lost_samples(time: Array) -> NDArray[np.bool_]:
-    """Intervals in which samples were lost.
+    """Intervals of ``time`` (n,) in which samples were lost, (n - 1,).
 
-    ``time`` (n,): stamps, s, increasing. Returns (n - 1,) of bool: longer than 2.5 median
-    intervals, or a whole number of them to 5 %.
+    They are longer than 2.5 median intervals, or a whole number of them to 5 %.
     """
     steps = np.diff(time)
     if not len(steps):
@@ -42,12 +38,8 @@ def gap_lengths(
     """Lengths of the gaps of one source of samples, s; those that overlap are one.
 
     A gap is an interval in which samples were lost (:func:`lost_samples`), one from an end of the
-    recording to the nearest sample, and one in which a channel has no value for more than half a
-    second and two intervals.
-
-    ``time`` (n,): stamps, s. ``columns``: channels of shape (n,) by name; those without a name do
-    not count. ``span``: first and last time of the recording, s, by default those of ``time``.
-    ``longest``: distance of a sample from the ends that is none, s, at least 2.5 intervals.
+    recording (``span``) to the nearest sample, unless at most ``longest``, and one in which a
+    channel has no value for more than half a second and two intervals.
     """
     stamps = np.unique(time)
     span = span or ((float(stamps[0]), float(stamps[-1])) if len(stamps) else (np.nan, np.nan))

@@ -181,10 +181,7 @@ class RunSummary:
 
 
 def summary_of(run: Run) -> RunSummary:
-    """Summarise a run.
-
-    Returns: size, rate, gaps and missing values.
-    """
+    """Size, rate, gaps and missing values of a run."""
     in_time = run.metadata.get("time") != "row number" and len(run) > 1
     constant = tuple(name for name in run if _is_constant(run, name))
     return RunSummary(

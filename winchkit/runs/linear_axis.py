@@ -17,11 +17,7 @@ def is_linear(names: Iterable[str]) -> bool:
 
 
 def rotary_runs(runs: Sequence[Run], *, is_linear_axis: bool) -> list[Run]:
-    """Runs with the channels of the model.
-
-    ``is_linear_axis``: whether the profile is one. Raises RunError for a run of the other kind of
-    motion.
-    """
+    """Runs with the channels of the model; RunError for a run of the other kind of motion."""
     faults = []
     for run in runs:
         if is_linear_axis and "motor_angle" in run:

@@ -15,10 +15,7 @@ OF_OUTPUT = {"motor_torque": "predicted_torque", "force": "predicted_force"}
 
 
 def with_prediction(run: Run, given: str) -> Run:
-    """The run with a column as the prediction of an output: ``motor_torque=tau_model``.
-
-    Raises UsageError for another output; RunError without the column, or with another unit.
-    """
+    """The run with a column as the prediction of an output; raises UsageError, RunError."""
     output, _, column = given.partition("=")
     if output not in OF_OUTPUT or not column:
         raise UsageError(

@@ -92,10 +92,7 @@ _OF_PROGRAMS = frozenset({"pandas", "ARROW:schema"})
 
 
 def _numbers(name: str, column: Any) -> Array | None:
-    """Values of a column, NaN where it is null; None for a column with text that is no channel.
-
-    Moments are in seconds after the first. Raises UsageError for a channel without numbers.
-    """
+    """Values of a column, moments in s from the first; None for text that is no channel."""
     import pyarrow as pa
 
     if pa.types.is_dictionary(column.type):

@@ -113,9 +113,6 @@ class TareBook(Table):
 
 
 def tare_book_path(bench_path: str) -> str:
-    """File of a bench's tares, beside its bench file.
-
-    Returns: ``bench.tares.toml`` for ``bench.toml``.
-    """
+    """File of a bench's tares: ``bench.tares.toml`` beside ``bench.toml``."""
     stem = bench_path.removesuffix(".toml")
     return f"{stem}.tares.toml"

@@ -42,10 +42,7 @@ LARGEST: Mapping[str, Bound] = {
 
 
 def check_size(value: float, dimension: str, text: object) -> float:
-    """The value, where it is finite and not beyond its dimension's bound; raises UsageError.
-
-    ``value``: SI value.
-    """
+    """The value (SI), where it is finite and not beyond its dimension's bound; else UsageError."""
     if not math.isfinite(value):
         raise UsageError(f"'{text}' must be finite; leave the key out where there is no value")
     bound = LARGEST.get(dimension)
@@ -58,8 +55,5 @@ def check_size(value: float, dimension: str, text: object) -> float:
 
 
 def typed_quantity(text: str, dimension: str) -> float:
-    """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError.
-
-    ``text``: number with unit, as people type it.
-    """
+    """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError."""
     return check_size(parse(text, dimension), dimension, text)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from winchkit.arguments import require_type
-from winchkit.errors import Fault, FileError
+from winchkit.regular_file import file_errors
 from winchkit.schema.file_text import file_text
 from winchkit.schema.quantity import (
     Length,
@@ -137,7 +137,5 @@ def write_programme(programme: Programme, path: Path) -> None:
     """
     require_type(programme, Programme, "programme")
     text = file_text("programme", programme)
-    try:
+    with file_errors(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error

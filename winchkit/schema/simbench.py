@@ -73,6 +73,12 @@ class SimBench(Table):
     platform: PlatformTruth | None = None
     """True platform of a robot; None for winches with a load each."""
 
+    @property
+    def answers(self) -> tuple[str, ...]:
+        """Catalogue ids of the hidden effects; for scoring only."""
+        hidden = [spec for truth in self.truth.values() for spec in truth.hidden]
+        return tuple(effect for spec in hidden for effect in spec.answers)
+
 
 def dotted_keys(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Values of tables within tables by dotted keys, as of :attr:`WinchTruth.overrides`."""

@@ -18,10 +18,7 @@ from winchkit.web.state import PageState
 
 
 def candidate_card(state: PageState, effect_id: str) -> dict[str, Any]:
-    """Card of a candidate of a diagnosis, with its signature.
-
-    Raises UsageError without a diagnosis, and for an effect that is no candidate.
-    """
+    """Card of a candidate with its signature; raises UsageError for an effect that is none."""
     answer = state.diagnosed
     engine, result = answer.engine, answer.result
     item = next((s for s in result.scores if s.candidate.effect.id == effect_id), None)

@@ -18,11 +18,10 @@ _POINTS = 1600
 
 
 def lines_of(runs: Iterable[tuple[str, Run]], channel: str, over: str = TIME) -> dict[str, Any]:
-    """A channel of each run over another, for the runs that have both.
+    """A channel of each run over another, or over time, for the runs that have both.
 
-    ``runs``: names and runs. ``over``: a channel or ``time``. Returns: ``lines`` with ``name``,
-    ``x``, ``y`` in the order of time, ``x_unit`` and ``unit``; over time, ``difference`` of two
-    runs, the first one interpolated at the instants of the second one as far as both last.
+    Over time there is the ``difference`` of two runs, the first one interpolated at the instants of
+    the second one as far as both last.
     """
     own = [(name, run) for name, run in runs if {channel, over} <= {TIME, *run.channels}]
     difference = _difference(own, channel) if over == TIME and len(own) == 2 else None

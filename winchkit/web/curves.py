@@ -32,7 +32,7 @@ from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, period_of
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.vocabulary import output_name, variable_name
 from winchkit.runs.run import Run
 
 _PANELS = 6
@@ -82,11 +82,7 @@ class OutputCurves:
         return replace(self, sizes=(largest, rms))
 
     def over_time(self, first: float, last: float, points: int) -> dict[str, Any]:
-        """A part of the curves, reduced to the extremes of every pixel.
-
-        ``first``, ``last``: part of the time, s. Returns: ``x``, ``measured``, ``predicted`` in the
-        unit of the output, ``residual`` in that of the residual, marks of the runs, and units.
-        """
+        """Curves between two times (s), reduced to the extremes of every pixel."""
         part = slice(*np.searchsorted(self.time, [first, last + 1e-9]))
         lines = [self.measured[part], self.predicted[part], self.residual[part] / self.scale.worth]
         drawn = lines if self.is_compared else lines[:1]
@@ -96,7 +92,7 @@ class OutputCurves:
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {
             "output": self.output,
-            "name": capital(OUTPUT_NAMES.get(self.output, self.output)),
+            "name": capital(output_name(self.output)),
             "unit": whole.label,
             "residual_unit": self.scale.label,
             "residual_worth": self.scale.worth,
@@ -114,10 +110,9 @@ class OutputCurves:
     def multiples(
         self, order: tuple[str, int] | None = None, variables: Sequence[str] = ()
     ) -> dict[str, Any]:
-        """Residual over each of some variables, at the same samples.
+        """Residual over each of some variables, by default those that explain most of it.
 
-        ``order``: an angle, and the periods per turn of the residual over it. ``variables``: by
-        default those that explain most of it.
+        ``order``: an angle, and the periods per turn of the residual over it.
         """
         compared = np.flatnonzero(np.isfinite(self.residual))
         kept = _thinned(compared)
@@ -140,12 +135,10 @@ class OutputCurves:
         }
 
     def main_variable(self, change: Array) -> tuple[str, int | None] | None:
-        """The variable over which a change of the prediction is drawn.
+        """Variable that explains most of a change (n,) of the prediction; None below a fifth.
 
-        ``change`` (n,): what a candidate adds to the prediction, SI. Returns: what explains most of
-        the change: an angle with the periods per turn of a sine over it, or a variable without
-        periods by its η² over bins; a part of a turn, over which every trend resembles a sine, is
-        thus no period. None where nothing explains a fifth of it.
+        It is an angle with the periods per turn of a sine over it, or a variable without periods by
+        its η² over bins; a part of a turn, over which every trend resembles a sine, is no period.
         """
         known = np.isfinite(self.residual) & np.isfinite(change)
         own = change[known] - np.mean(change[known]) if known.any() else change[known]
@@ -161,11 +154,7 @@ class OutputCurves:
         return None if best is None or shares[best] <= CLEAR_ORDER else best
 
     def signature(self, change: Array, variable: str, order: int | None) -> dict[str, Any]:
-        """Residual and the change by a candidate over a variable, both as means over bins.
-
-        ``change`` (n,): what the candidate adds to the prediction, SI. ``order``: periods per turn,
-        where the variable is an angle.
-        """
+        """Residual and the change (n,) by a candidate over a variable, both as means over bins."""
         compared = np.flatnonzero(np.isfinite(self.residual) & np.isfinite(change))
         kept = _thinned(compared)
         lines = [self.residual / self.scale.worth, change / self.scale.worth]
@@ -210,11 +199,7 @@ class OutputCurves:
 def curves_of(
     regression: TimeSeriesRegression, residual: Array, noise: dict[str, float | None]
 ) -> dict[str, OutputCurves]:
-    """Curves of every output.
-
-    ``residual`` (rows,). ``noise``: rms of the noise by output, SI. Returns: by output, in the
-    order of the data set.
-    """
+    """Curves of every output of a residual (rows,), with the rms of its noise, SI."""
     recordings, profile = regression.dataset.recordings, regression.dataset.profile
     traces = traces_of(regression, residual)
     out: dict[str, OutputCurves] = {}
@@ -303,7 +288,7 @@ def _thinned(compared: Indices) -> Indices:
 
 
 def _capital_name(variable: str) -> str:
-    return capital(VARIABLE_NAMES.get(variable, variable))
+    return capital(variable_name(variable))
 
 
 def _largest(values: Array) -> float:

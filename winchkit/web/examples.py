@@ -40,8 +40,8 @@ class ExampleRuns:
     @property
     def truth(self) -> str:
         """Names and identifiers of the hidden effects, or ``nothing``."""
-        found = [a for t in self.bench.truth.values() for spec in t.hidden for a in spec.answers]
-        return ", ".join(f"{effect_name(effect)} ({effect})" for effect in found) or "nothing"
+        named = [f"{effect_name(effect)} ({effect})" for effect in self.bench.answers]
+        return ", ".join(named) or "nothing"
 
     @property
     def runs(self) -> Iterator[Run]:

@@ -36,9 +36,8 @@ def is_run(path: Path) -> bool:
 def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Columns of a file of another program with the channels that they may be.
 
-    ``answers``: ``columns`` as the command line takes them (``tension=F [N]``), constants by name,
-    and ``options`` of the command line that answer a question (``--signed "torque"``). Raises
-    FileError where no reader knows the file.
+    ``answers``: as :func:`~winchkit.runs.importing.answers.read_answers`. Raises FileError where no
+    reader knows the file.
     """
     (guess,) = guesses_of([read_table(path)], read_answers(answers or {}))
     columns = {column.source: column for column in guess.table.columns}
@@ -81,10 +80,9 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
 
 
 def imported(path: Path, answers: Mapping[str, Any]) -> Run:
-    """The run of a file with the answers of the page.
+    """The run of a file with the answers of the page, and ``load_mass``.
 
-    ``answers``: as for :func:`preview`; ``load_mass`` besides. Raises UsageError where something is
-    still not known; RunError with every fault of the file.
+    Raises UsageError where something is still not known; RunError with every fault of the file.
     """
     (guess,) = guesses_of([read_table(path)], read_answers(answers))
     if guess.questions:
@@ -98,10 +96,7 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
 
 
 def import_command(file: str, answers: Mapping[str, Any], folder: str) -> str:
-    """Command that imports a file as the page did.
-
-    ``answers``: as for :func:`imported`. ``folder``: of the run.
-    """
+    """Command that imports a file with the answers of the page to a folder."""
     words = ["winchkit", "import", file, "-y", "--replace", "-o", folder]
     for column in answers.get("columns", ()):
         words += ["--column", str(column)]

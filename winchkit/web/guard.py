@@ -1,11 +1,7 @@
 """Requests that the page refuses: other hosts, other origins, and those without the token.
 
-Everything but the page's own files needs the token of the URL. The content security policy
-forbids everything that does not come from this server.
-
-References
-----------
-W3C (2024). Content Security Policy Level 3. OWASP: Cross-Site WebSocket Hijacking.
+Everything but the page's own files needs the token of the URL. The content security policy (W3C,
+Level 3) forbids everything that does not come from this server.
 """
 
 from __future__ import annotations

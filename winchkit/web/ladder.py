@@ -31,7 +31,7 @@ from winchkit.report.words.steps import (
     step_text,
     step_title,
 )
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name, parameter_name
+from winchkit.report.words.vocabulary import effect_name, output_name, parameter_name
 from winchkit.web.words import page_text
 
 _SHOWN = 8
@@ -172,7 +172,7 @@ def ladder(
         "columns": [
             {
                 "output": name,
-                "name": capital(OUTPUT_NAMES.get(name, name)),
+                "name": capital(output_name(name)),
                 "unit": scales[name].label,
                 "source": out.noise_source,
             }

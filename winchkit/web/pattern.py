@@ -23,10 +23,7 @@ from winchkit.web.state import PageState
 
 
 def pattern(state: PageState, number: int) -> dict[str, Any]:
-    """One of these with its curve, that of the closest law, and the effect that adds it as a curve.
-
-    Raises UsageError without a diagnosis, and for a number that is none.
-    """
+    """A pattern with its curve, that of the closest law, and the effect that adds it as a curve."""
     answer = state.diagnosed
     known = patterns_of(answer.diagnosis)
     if not 0 <= number < len(known):

@@ -14,7 +14,7 @@ from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
 from winchkit.quantity_text import quantity
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name
+from winchkit.report.words.vocabulary import effect_name, output_name
 from winchkit.web.curves import curves_of
 from winchkit.web.ladder import ModelErrors
 from winchkit.web.state import PageState, Version
@@ -23,10 +23,7 @@ from winchkit.web.state import PageState, Version
 def refit(
     state: PageState, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path
 ) -> PageState:
-    """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.
-
-    Raises UsageError without a diagnosis, and for an unknown effect.
-    """
+    """State with an effect in the profile, refitted but not yet diagnosed; raises UsageError."""
     answer = state.answer
     if answer is None:
         raise UsageError("nothing is diagnosed yet")
@@ -71,4 +68,4 @@ def _said(outputs: Mapping[str, OutputFit]) -> str:
     name = max(outputs, key=fall)
     out = outputs[name]
     after, before = (quantity(v, out.unit) for v in (out.heldout_rms_after, out.heldout_rms_before))
-    return f"{OUTPUT_NAMES.get(name, name).capitalize()} error {after}, was {before}"
+    return f"{output_name(name).capitalize()} error {after}, was {before}"

@@ -27,8 +27,9 @@ from winchkit.diagnosis.plan import plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import write_wave_on_drum
-from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.errors import FileError, UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
+from winchkit.regular_file import file_errors
 from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
@@ -90,10 +91,9 @@ class StoredRun(Protocol):
 
 
 class DiagnoseView:
-    """State of the Diagnose view and the one thread that changes it.
+    """State of the Diagnose view and the one thread that changes it, which calls ``changed``.
 
-    ``folder``: of the server's own. ``changed``: called, from the working thread, whenever there is
-    something new to show. ``work``: the user's folder, by default one within ``folder``.
+    ``folder``: of the server's own. ``work``: the user's folder, by default one within ``folder``.
     """
 
     def __init__(
@@ -166,10 +166,7 @@ class DiagnoseView:
         return self.task("simulating runs", lambda: self._example(name))
 
     def mystery(self, seed: int) -> Future[None]:
-        """Simulate runs of a bench whose hidden effect is shown on request only.
-
-        No command makes them without its name: they are written into the user's folder.
-        """
+        """Simulate runs of a bench with a hidden effect; no command makes them without its name."""
         return self.task("simulating runs", lambda: self._mystery(seed))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:
@@ -478,10 +475,8 @@ class DiagnoseView:
 
     @staticmethod
     def _made(folder: Path) -> Path:
-        try:
+        with file_errors(folder, "made"):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
         return folder
 
     def _use(self, name: str, *, used: bool) -> None:

@@ -7,22 +7,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from declared import ONE_WINCH
 from winchkit.cli import SECTIONS, main
-
-BENCH = """schema = 1
-kind = "bench"
-cycle = "4 ms"
-[bus.can]
-kind = "can"
-interface = "virtual"
-channel = "defaults"
-[winch.A]
-profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
-[winch.A.limits]
-speed = "0.5 m/s"
-acceleration = "1 m/s^2"
-"""
 
 
 def stop(*arguments: str, **environment: str) -> Result:
@@ -37,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_the_only_bench_file_of_the_folder(folder: Path) -> None:
-    (folder / "lab.toml").write_text(BENCH)
+    (folder / "lab.toml").write_text(ONE_WINCH)
     (folder / "other.toml").write_text('schema = 1\nkind = "programme"\n')
     result = stop()
     assert result.exit_code == 0, result.output
@@ -46,7 +32,7 @@ def test_the_only_bench_file_of_the_folder(folder: Path) -> None:
 
 def test_none_is_chosen_of_two(folder: Path) -> None:
     for name in ("left.toml", "right.toml"):
-        (folder / name).write_text(BENCH)
+        (folder / name).write_text(ONE_WINCH)
     result = stop()
     assert result.exit_code == 2
     assert "no bench is given: this folder has left.toml, right.toml" in result.stderr
@@ -61,7 +47,7 @@ def test_none_without_a_bench_file(folder: Path) -> None:
 
 def test_the_variable_of_all_commands(folder: Path) -> None:
     (folder / "there").mkdir()
-    (folder / "there" / "lab.toml").write_text(BENCH)
+    (folder / "there" / "lab.toml").write_text(ONE_WINCH)
     assert stop(WINCHKIT_BENCH="there/lab.toml").exit_code == 0
     wrong = stop(WINCHKIT_BENCH="there/lab.toml", WINCHKIT_STOP_BENCH="nowhere.toml")
     assert wrong.exit_code == 3, "the command's own variable comes first"

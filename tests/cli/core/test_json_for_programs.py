@@ -7,13 +7,13 @@ import math
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from sim_process import first_line, start
+from waiting import until
 from winchkit.runs import read_run
 
 pytestmark = [
@@ -76,10 +76,7 @@ def test_a_log_that_is_interrupted_ends_with_its_rows_too(
 ) -> None:
     path = tmp_path / "lift.csv"
     with start("log", "-b", served, "-o", path, "--json") as process:
-        end = time.monotonic() + 40
-        while not path.is_file() or path.read_bytes().count(b"\n") < 60:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        until(lambda: path.is_file() and path.read_bytes().count(b"\n") >= 60, within=40.0)
         process.send_signal(number)
         out, told = process.communicate(timeout=60)
     assert process.returncode == code, told
@@ -102,10 +99,7 @@ def test_monitor_ends_at_a_signal(served: Path, number: int, code: int) -> None:
 def test_a_log_that_fails_says_how_many_rows_are_saved(served: Path, tmp_path: Path) -> None:
     path = tmp_path / "lift.csv"
     with start("log", "-b", served, "-o", path, "--json") as process:
-        end = time.monotonic() + 40
-        while not path.is_file() or path.read_bytes().count(b"\n") < 60:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        until(lambda: path.is_file() and path.read_bytes().count(b"\n") >= 60, within=40.0)
         path.unlink()
         out, told = process.communicate(timeout=60)
     assert process.returncode == 3

@@ -202,7 +202,7 @@ def test_every_effect_of_the_catalogue_has_its_own_words() -> None:
         ),
         (Attribution("tension", "reversal_distance", 0.2), "a function of distance since reversal"),
         (Attribution("tension", "time", 0.2, frequency=0.314), "tension, around 0.31 Hz"),
-        (Attribution("sag", "moon_phase", 0.2), "sag, as a function of moon_phase"),
+        (Attribution("sag", "moon_phase", 0.2), "sag, as a function of moon phase"),
     ],
 )
 def test_attributions_in_words(where: Attribution, text: str) -> None:

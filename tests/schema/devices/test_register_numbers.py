@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from winchkit import catalog
 from winchkit.errors import FileError
 from winchkit.schema.devices.modbus import ReadBlock
 from winchkit.schema.devices.register_numbers import address_of
@@ -114,9 +113,3 @@ def test_a_map_of_both_is_refused_with_its_line(
 @pytest.mark.parametrize("start", [0, 7, 9999, 30_000, 40_000, 50_000])
 def test_an_address_is_none(start: int) -> None:
     assert ReadBlock(start, 4).doubt == ""
-
-
-@pytest.mark.parametrize("name", catalog.names("devices"))
-def test_no_shipped_device_has_one(name: str) -> None:
-    warnings = load(catalog.find("devices", name)).warnings
-    assert not [one for one in warnings if "register's number" in one.message]

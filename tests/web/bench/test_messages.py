@@ -20,6 +20,7 @@ pytest.importorskip("starlette")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from declared import ONE_WINCH
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.web.bench.browser import Browser
@@ -28,20 +29,6 @@ from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.view import BenchView
 from winchkit.web.words import INTERNAL
 
-BENCH = """schema = 1
-kind = "bench"
-cycle = "4 ms"
-[bus.can]
-kind = "can"
-interface = "virtual"
-channel = "messages"
-[winch.A]
-profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "can", node = 1 }
-[winch.A.limits]
-speed = "0.5 m/s"
-acceleration = "1 m/s^2"
-"""
 MOTIONS = {"jog", "step", "move", "move_pose"}
 """Calls of a station that move something."""
 
@@ -99,7 +86,7 @@ class Page:
 @pytest.fixture(scope="module")
 def bench_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bench") / "bench.toml"
-    path.write_text(BENCH)
+    path.write_text(ONE_WINCH)
     return path
 
 

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from starlette.applications import Starlette
 from starlette.testclient import TestClient
 
+from declared import ONE_WINCH
 from winchkit.catalog import find
 from winchkit.errors import FileError, NotPermitted, UsageError, WinchkitError
 from winchkit.runs.read import read_run
@@ -223,22 +224,6 @@ def test_settings_are_listed_with_types_and_limits_of_the_eds(spec: BenchSpec) -
     assert "6040h" not in known
 
 
-BENCH = """schema = 1
-kind = "bench"
-cycle = "4 ms"
-[bus.can]
-kind = "can"
-interface = "virtual"
-channel = "trip"
-[winch.A]
-profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
-[winch.A.limits]
-speed = "0.5 m/s"
-acceleration = "1 m/s^2"
-"""
-
-
 def tripped() -> dict[str, Any]:
     """History of a trip of two winches."""
     time = [-0.02, -0.01, 0.0, 0.01]
@@ -288,7 +273,7 @@ def test_the_page_saves_a_trip_until_its_reset(tmp_path: Path) -> None:
             return self.history
 
     bench = tmp_path / "bench.toml"
-    bench.write_text(BENCH)
+    bench.write_text(ONE_WINCH)
     view = BenchView(str(bench), allow_motion=False, folder=tmp_path)
     refusals = {WinchkitError: partial(_refused, SimpleNamespace(words=str))}
     with TestClient(Starlette(routes=view.routes(), exception_handlers=refusals)) as client:

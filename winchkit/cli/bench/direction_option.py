@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.options import Decorator, all_of
 from winchkit.cli.core.quantities import dimension, quantity
 from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 @dataclass(frozen=True)
@@ -49,18 +47,11 @@ class Directed:
 
 def direction_options(value: str) -> Decorator:
     """Add --pay-out and --wind-in; ``value`` says what they take, e.g. ``SPEED|LENGTH``."""
-
-    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        for option, meaning in (("--wind-in", "Shorten"), ("--pay-out", "Lengthen")):
-            function = click.option(
-                option,
-                metavar=value,
-                type=QuantityType("speed", "length", example="50 mm"),
-                help=f"{meaning} the cable.",
-            )(function)
-        return function
-
-    return decorate
+    kind = QuantityType("speed", "length", example="50 mm")
+    return all_of(
+        click.option("--pay-out", metavar=value, type=kind, help="Lengthen the cable."),
+        click.option("--wind-in", metavar=value, type=kind, help="Shorten the cable."),
+    )
 
 
 def read_direction(pay_out: str | None, wind_in: str | None) -> Directed | None:

@@ -15,10 +15,7 @@ def hold_on(
     duration: float,
     look: Callable[[], object] = lambda: None,
 ) -> None:
-    """Refresh what was just started for ``duration`` s; raises MotionError where it has ended.
-
-    ``look`` is called after each refresh.
-    """
+    """Refresh what was started for ``duration`` s, ``look`` each time; MotionError if it ended."""
     from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
 
     clock = station.clock

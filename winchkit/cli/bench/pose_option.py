@@ -18,11 +18,7 @@ COORDINATES = {
 
 
 def read_pose(text: str) -> dict[str, float]:
-    """Coordinates by name, m and rad; raises UsageError.
-
-    ``text``: ``NAME=QUANTITY``, separated by commas. Returns: at least one; those that are not
-    named keep their value.
-    """
+    """Coordinates that ``x=1 m,yaw=5 deg`` names, m and rad; raises UsageError."""
     found: dict[str, float] = {}
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isnan
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.completion import complete_winch
-from winchkit.cli.core.options import bench_option
+from winchkit.cli.core.options import all_of, bench_option
 from winchkit.cli.core.output import json_flag
 
 if TYPE_CHECKING:
@@ -19,16 +19,11 @@ if TYPE_CHECKING:
 _UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
 
 
-def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the argument CELL, --bench and --json."""
-    options: list[Callable[..., Any]] = [
-        click.argument("cell", required=False, shell_complete=complete_winch),
-        bench_option,
-        json_flag("Print the result as JSON."),
-    ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+cell_options = all_of(
+    click.argument("cell", required=False, shell_complete=complete_winch),
+    bench_option,
+    json_flag("Print the result as JSON."),
+)
 
 
 @contextmanager

@@ -10,73 +10,58 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from winchkit.errors import FileError
 from winchkit.regular_file import regular
+
+if TYPE_CHECKING:
+    from winchkit.catalog import Kind
 
 _KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
 _HEAD = 2000
 """Characters of a file in which its kind stands."""
-_PROFILES = ("winch", "axis", "robot")
 _RUNS = (".csv", ".mcap")
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 
-def complete_bench(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Bench files, and folders that may hold some."""
-    return _declarations(typed, ("bench",))
+def _completer(
+    wanted: Callable[[Path], bool] | None, shipped: Callable[[], Iterable[str]] = tuple
+) -> Completer:
+    """Names that are shipped, and files that are wanted, with folders that may hold some."""
+
+    def complete(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
+        return _names(shipped(), typed) + ([] if wanted is None else _files(typed, wanted))
+
+    return complete
 
 
-def complete_programme(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Programmes in files, and those that are shipped, by name."""
-    from winchkit import catalog
-
-    shipped = [path.stem for path in catalog.folder("sim").glob("programme-*.toml")]
-    return _names(shipped, typed) + _declarations(typed, ("programme",))
+def _of_kind(*kinds: str) -> Callable[[Path], bool]:
+    return lambda path: path.suffix == ".toml" and _kind(path) in kinds
 
 
-def complete_sim_bench(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Simulated benches in files, and those that are shipped, by name."""
-    from winchkit import catalog
+def _shipped(kind: Kind, *, programmes: bool = False) -> Callable[[], list[str]]:
+    """Names of the catalogue, which is imported for a completion only."""
 
-    shipped = [name for name in catalog.names("sim") if not name.startswith("programme-")]
-    return _names(shipped, typed) + _declarations(typed, ("sim-bench",))
+    def names() -> list[str]:
+        from winchkit import catalog
 
+        return [n for n in catalog.names(kind) if n.startswith("programme-") is programmes]
 
-def complete_profile(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Profiles in files, and those that are shipped, by name."""
-    from winchkit import catalog
-
-    return _names(catalog.names("profiles"), typed) + _declarations(typed, _PROFILES)
+    return names
 
 
-def complete_device(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Shipped devices."""
-    from winchkit import catalog
-
-    return _names(catalog.names("devices"), typed)
-
-
-def complete_run(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Runs and logs, and folders that may hold some."""
-    return _files(typed, lambda path: path.suffix.lower() in _RUNS)
-
-
-def complete_file(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Any file, and folders."""
-    return _files(typed, lambda _path: True)
+complete_bench = _completer(_of_kind("bench"))
+complete_programme = _completer(_of_kind("programme"), _shipped("sim", programmes=True))
+complete_sim_bench = _completer(_of_kind("sim-bench"), _shipped("sim"))
+complete_profile = _completer(_of_kind("winch", "axis", "robot"), _shipped("profiles"))
+complete_device = _completer(None, _shipped("devices"))
+complete_run = _completer(lambda path: path.suffix.lower() in _RUNS)
+complete_file = _completer(lambda _path: True)
 
 
 _EFFECT = re.compile(r'^    id="([\w-]+)",$', re.MULTILINE)
@@ -98,7 +83,6 @@ def complete_effect_of_profile(
 ) -> list[CompletionItem]:
     """Effects that the profile on the line has already; all effects where there is none."""
     from winchkit import catalog
-    from winchkit.errors import FileError
 
     profile = _given(ctx, "profile")
     if not profile:
@@ -149,10 +133,6 @@ def _table(path: Path) -> dict[str, Any]:
 
 def _names(known: Iterable[str], typed: str) -> list[CompletionItem]:
     return [CompletionItem(name) for name in sorted(known) if name.startswith(typed)]
-
-
-def _declarations(typed: str, kinds: tuple[str, ...]) -> list[CompletionItem]:
-    return _files(typed, lambda path: path.suffix == ".toml" and _kind(path) in kinds)
 
 
 def _files(typed: str, wanted: Callable[[Path], bool]) -> list[CompletionItem]:

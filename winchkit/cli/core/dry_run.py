@@ -220,11 +220,7 @@ def _simulated(
     *,
     cells: bool = False,
 ) -> SimBench:
-    """The bench as it is wired, without instruments or with ``cells``, its declarations being true.
-
-    ``mass`` (kg) is on a winch without a declared load, or with cells on each. A trip of the
-    rehearsal is not kept.
-    """
+    """The bench as it is wired; ``mass`` (kg) of winches without one, with ``cells`` on all."""
     from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
 
     winches = {

@@ -45,10 +45,7 @@ def check_new_profile(path: str | Path, option: str = "-o") -> None:
 
 
 def check_folder(path: str | Path, option: str = "-o") -> None:
-    """Raise UsageError for a folder that cannot be made, since a file is in its way.
-
-    Raises FileError where it must not be written or made.
-    """
+    """Raise UsageError where a file is in a folder's way, FileError where it cannot be written."""
     places = (Path(path), *Path(path).parents)
     for place in places:
         if place.exists() and not place.is_dir():

@@ -34,10 +34,7 @@ Found = Callable[[], Iterable[tuple[str, str, CommandPlace]]]
 
 
 class LazyGroup(Group):
-    """A group whose commands stand in tables until one of them is called.
-
-    ``further`` are listed with them, ``foreign`` looked for where no other name fits.
-    """
+    """A group whose commands stand in tables until one is called; ``foreign`` are not listed."""
 
     def __init__(
         self,
@@ -126,10 +123,7 @@ class LazyGroup(Group):
 
 
 def _name_variables(command: click.Command, prefix: str) -> None:
-    """Name the environment variables of a command after its options as they are typed.
-
-    click itself would take the name of the Python argument, such as ``duration`` for ``--for``.
-    """
+    """Name the environment variables of a command by its options, not by click's argument names."""
     for option in command.params:
         if isinstance(option, click.Option) and option.envvar is None:
             typed = [name[2:] for name in option.opts if name.startswith("--")]

@@ -50,12 +50,7 @@ def detail(text: str) -> None:
 
 
 def suggest_next(*words: str | Sequence[str]) -> None:
-    """Suggest the command that usually follows, quoted for a shell.
-
-    There is none beside JSON, nor of data that came from standard input.
-
-    ``*words``: the command after ``winchkit``, one word each; a sequence is one of files.
-    """
+    """Suggest the command that usually follows, but not beside JSON or for standard input."""
     from winchkit.cli.core.output import is_json
 
     context = click.get_current_context(silent=True)

@@ -43,10 +43,10 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """The bench that was given, else the one bench file of this folder.
+    """The bench that was given, else the one bench file of this folder; raises UsageError.
 
-    Raises UsageError where the folder has none or several. A file that the command line does not
-    name is reported on stderr, since a command may move what it describes.
+    A file that the command line does not name is reported on stderr, since a command may move what
+    it describes.
     """
     if ctx.resilient_parsing:
         return value
@@ -121,10 +121,7 @@ def _bench_of_either(ctx: click.Context, param: click.Parameter, value: str | No
 
 
 def bench_argument(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The bench as an argument, and as the option ``-b`` that other commands have.
-
-    ``function``: a command with the parameter ``bench``.
-    """
+    """The bench as an argument, and as the option ``-b`` that other commands have."""
     argument = click.argument(
         "bench_file",
         required=False,
@@ -161,10 +158,7 @@ device_option: Decorator = click.option(
 def quantity_option(
     *names: str, of: str, help: str, example: str = "", default: str | None = None
 ) -> Decorator:
-    """An option that is a quantity; its default is the example of its messages, too.
-
-    ``names``: as of click. ``of``: dimension.
-    """
+    """An option that is a quantity; its default is the example of its messages, too."""
     kind = QuantityType(of, example=default or example)
     shown = default is not None
     return click.option(*names, type=kind, default=default, show_default=shown, help=help)
@@ -180,7 +174,7 @@ _OUTPUT_CHECKS = {"DIR": check_folder, "NEW.toml": check_new_profile}
 
 
 def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:
-    """The option ``-o``: where a command writes; ``names`` are further spellings of it.
+    """The option ``-o``, or further names: where a command writes.
 
     With the metavar ``DIR`` a folder, which may be made, else a file in an existing folder, with
     ``NEW.toml`` a profile: a place that cannot be written is refused before the work, unless the
@@ -256,20 +250,24 @@ class BusChoice:
         return bus_only(self.interface, self.channel, self.bitrate, self.port)
 
 
-def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --bench or, in its place, the options of a CAN bus."""
-    options = [
-        bench_file_option(),
-        click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
-        click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
-        click.option(
-            "--bitrate",
-            default=_BITRATE,
-            show_default=True,
-            help="Without a bench: bit rate, bit/s.",
-        ),
-        click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
-    ]
-    for option in reversed(options):
-        function = option(function)
-    return function
+def all_of(*options: Decorator) -> Decorator:
+    """Several options as one, in the order of the help."""
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+bus_options = all_of(
+    bench_file_option(),
+    click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
+    click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
+    click.option(
+        "--bitrate", default=_BITRATE, show_default=True, help="Without a bench: bit rate, bit/s."
+    ),
+    click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
+)
+"""--bench or, in its place, the options of a CAN bus."""

@@ -62,10 +62,7 @@ def _run(call: Callable[[], object], interruption: Interruption) -> int:
 
 
 def _failed(error: Exception) -> int:
-    """Report what the operating system refused, else a defect of winchkit; returns the exit code.
-
-    A refusal has the name of a file, or is that of a full disk below standard output.
-    """
+    """Report what the operating system refused, else a defect of winchkit; gives the exit code."""
     if isinstance(error, OSError):
         place = error.filename if isinstance(error.filename, str) else ""
         if place or error.errno in _FULL:
@@ -89,10 +86,7 @@ def _interrupt(error: BaseException) -> BaseException | None:
 
 @contextmanager
 def threads_abandoned() -> Iterator[None]:
-    """Around what computes in threads and holds nothing open: Ctrl-C ends the process at once.
-
-    Python would wait for the threads, for seconds.
-    """
+    """Around computations in threads: Ctrl-C ends the process at once, where Python would wait."""
     try:
         yield
     except KeyboardInterrupt as error:

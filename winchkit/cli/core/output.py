@@ -47,10 +47,7 @@ def tell(data: Mapping[str, Any], lines: Iterable[str]) -> None:
 
 
 def to_json(value: object) -> str:
-    """One line of JSON; NaN and infinity become null, dataclasses objects, and arrays lists.
-
-    Characters that steer a terminal are escaped, which JSON reads as themselves.
-    """
+    """One line of JSON, null for what is not finite; what steers a terminal is escaped."""
     text = json.dumps(plain(value), ensure_ascii=False, allow_nan=False)
     return CONTROL_CHARACTERS.sub(lambda found: json.dumps(found[0])[1:-1], text)
 

@@ -16,11 +16,7 @@ def quantity(text: str, dimension: str) -> float:
 
 
 def check_typed(option: str, text: str, *dimensions: str, example: str = "") -> None:
-    """Check a quantity of one of some dimensions that was typed for an option.
-
-    ``example``: by default 2 of the first unit. Raises UsageError with option, value, what is
-    expected and an example.
-    """
+    """Check a quantity that was typed for an option; UsageError with an example."""
     faults = []
     for name in dimensions:
         try:

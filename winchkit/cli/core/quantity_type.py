@@ -6,14 +6,7 @@ import click
 
 
 class QuantityType(click.ParamType):  # type: ignore[type-arg]
-    """A number with a unit of one of some dimensions.
-
-    It stays the text that was typed, which messages repeat; the command converts it to SI by
-    :mod:`winchkit.cli.core.quantities`.
-
-    ``dimensions``: names of the dimensions of :data:`winchkit.units.UNITS` that are accepted.
-    ``signed``: whether a time may be below zero.
-    """
+    """A number with a unit; it stays the text that was typed, which messages repeat."""
 
     def __init__(self, *dimensions: str, example: str, signed: bool = False) -> None:
         self.dimensions = dimensions

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -16,11 +15,10 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from winchkit.cli.core.completion import Completer
 from winchkit.cli.core.messages import COPY_OF_INPUT, note
 from winchkit.cli.core.output import is_json
 from winchkit.cli.core.terminal import EscapedStream
-
-Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 _MAGIC = (
     (b"\x89MCAP", ".mcap"),
@@ -62,10 +60,7 @@ def may_ask() -> bool:
 
 
 class Readable(click.ParamType):  # type: ignore[type-arg]
-    """A file to read, or standard input.
-
-    ``complete``: by default files.
-    """
+    """A file to read, or standard input."""
 
     def __init__(self, what: str, complete: Completer | None = None) -> None:
         self.name = what

@@ -83,20 +83,13 @@ class _EscapedBytes(io.BufferedIOBase):
 
 
 def screen(stream: TextIO | None = None) -> TextIO:
-    """A stream that may steer the terminal: standard error, or the one that is given.
-
-    What is written to it from a file or a device has to be :func:`~winchkit.errors.printable`.
-    """
+    """A stream that may steer the terminal; text of files must be ``printable`` before."""
     asked: TextIO = sys.stderr if stream is None else stream
     return getattr(asked, "rich_proxied_file", asked)
 
 
 def terminal_console() -> Console:
-    """A console of rich on standard error.
-
-    rich takes the standard error of the moment, which escapes what steers the terminal: a live
-    display would appear as its own control sequences.
-    """
+    """A console of rich on standard error, not escaped: a live display would show its sequences."""
     from rich.console import Console
 
     return Console(file=screen())
@@ -147,10 +140,7 @@ def live_display(live: Live) -> Iterator[None]:
 
 @contextmanager
 def live_table(first: RenderableType = "", *, auto_refresh: bool = False) -> Iterator[Live]:
-    """A live display on standard error, whose content the caller replaces.
-
-    With ``auto_refresh`` it is redrawn four times a second, else by ``update(..., refresh=True)``.
-    """
+    """A live display on standard error, whose content the caller replaces; four times a second."""
     from rich.live import Live
 
     live = Live(
@@ -192,10 +182,7 @@ UNKNOWN_LENGTH = "length unknown (home it)"
 
 
 def status_line(status: dict[str, Any]) -> str:
-    """Length, cable speed (positive pays out), tension and phase of each winch of a status.
-
-    Beside the length that the profile says, what an instrument shows, where there is one.
-    """
+    """Length (an instrument's as well), cable speed (pays out), tension and phase by winch."""
     parts = []
     for name, winch in status["winch"].items():
         known = winch["length_known"]
@@ -222,10 +209,7 @@ def _decimals(value: float | None, digits: int = 3) -> str:
 
 @contextmanager
 def progress_bar() -> Iterator[ProgressCallback]:
-    """Gives a function to call with the present task and the share (0 to 1) that is done, or None.
-
-    A bar on a terminal, lines with ``-v``, nothing with ``-q`` or without a terminal.
-    """
+    """A function for task and share done (0 to 1): a bar, lines with ``-v``; or None."""
     if is_verbose():
         yield _steps()
         return

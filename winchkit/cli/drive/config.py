@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,15 +33,6 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 _who = click.argument("who", required=True, metavar="WINCH|NODE", shell_complete=complete_winch)
 _file = click.argument("file", type=TABLE, metavar="FILE")
 _json = json_flag("Print the result as JSON.")
-
-
-@dataclass(frozen=True)
-class Asking:
-    """Confirmation and report of what cannot be undone."""
-
-    what: str
-    yes: bool
-    dry_run: bool
 
 
 @click.group(
@@ -171,8 +161,7 @@ def store(who: str, *, yes: bool, dry_run: bool, **bus: Any) -> None:
     from winchkit.drivers.can.tools.config import STORE
     from winchkit.drivers.can.tools.config import store as write
 
-    asking = Asking("overwrite its memory", yes, dry_run)
-    _sign(BusChoice(**bus), who, STORE, write, asking)
+    _sign(BusChoice(**bus), who, STORE, write, "overwrite its memory", yes=yes, dry_run=dry_run)
 
 
 @command.command(
@@ -191,8 +180,8 @@ def restore(who: str, *, yes: bool, dry_run: bool, **bus: Any) -> None:
     from winchkit.drivers.can.tools.config import RESTORE
     from winchkit.drivers.can.tools.config import restore as write
 
-    asking = Asking("forget its settings at its next start", yes, dry_run)
-    _sign(BusChoice(**bus), who, RESTORE, write, asking)
+    what = "forget its settings at its next start"
+    _sign(BusChoice(**bus), who, RESTORE, write, what, yes=yes, dry_run=dry_run)
 
 
 def _sign(
@@ -200,20 +189,23 @@ def _sign(
     who: str,
     signed: tuple[int, bytes],
     write: Callable[[Objects], None],
-    asking: Asking,
+    what: str,
+    *,
+    yes: bool,
+    dry_run: bool,
 ) -> None:
-    """Ask, then let the drive act on its memory."""
+    """Ask, then let the drive act on its memory, which cannot be undone."""
     from winchkit.bench.drives.node_access import drive_at
 
     index, signature = signed
-    if asking.dry_run:
+    if dry_run:
         _show(choice, who, [(index, 1, signature)])
         return
     with drive_at(choice.spec(), who, writes=True) as node:
-        if not asking.yes:
-            click.confirm(f"{node.name}: {asking.what}?", abort=True, err=True)
+        if not yes:
+            click.confirm(f"{node.name}: {what}?", abort=True, err=True)
         write(node.objects)
-    tell({"name": node.name, "done": asking.what}, [f"{node.name}: done"])
+    tell({"name": node.name, "done": what}, [f"{node.name}: done"])
 
 
 def _show_load(choice: BusChoice, who: str, file: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.core.command import Example, Group
 from winchkit.cli.core.dry_run import PlannedFrame, show_frames
-from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
+from winchkit.cli.core.options import BusChoice, all_of, bus_options, dry_run_option
 from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import UsageError
 
@@ -80,14 +80,13 @@ class _Number(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"'{text}' is no number; write 26, 0x1A or 1Ah", param, ctx)
 
 
-def _identity_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the four parts of an identity."""
-    for part in reversed(_PARTS):
-        function = click.option(
-            f"--{part}", type=_Number(), help="Number of the identity object, 1018h."
-        )(function)
-    only = click.option("--only", is_flag=True, help="The only device on the bus, whichever it is.")
-    return only(function)
+_identity_options = all_of(
+    click.option("--only", is_flag=True, help="The only device on the bus, whichever it is."),
+    *(
+        click.option(f"--{part}", type=_Number(), help="Number of the identity object, 1018h.")
+        for part in _PARTS
+    ),
+)
 
 
 @click.group(

@@ -177,8 +177,8 @@ def effect_faults_and_warnings(
     """Faults of the effects of a declaration's profiles, and effects that were not checked.
 
     ``effects`` are the Python files that the user named (``--effects``): they are executed. Those
-    that a bench file names (its key ``effects``) are not, unless the user named them as well: an
-    effect that the catalogue lacks may stand in one of them, so it is no fault then.
+    that a bench file names are not: an effect that the catalogue lacks may stand in one of them, so
+    it is no fault then.
     """
 
     profiles, bench = _profiles(value), bench_of(value)

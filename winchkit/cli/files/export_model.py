@@ -63,7 +63,7 @@ def command(
     from winchkit.cli.model.options import declared_profile
     from winchkit.dynamics.export import export_model
     from winchkit.effects import load_catalogue
-    from winchkit.errors import Fault, FileError
+    from winchkit.regular_file import file_errors
     from winchkit.runs.files import refuse_existing
 
     if output is not None:
@@ -76,8 +76,6 @@ def command(
     if output is None:
         click.echo(exported.text, nl=False)
         return
-    try:
+    with file_errors(output):
         Path(output).write_text(exported.text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", output)) from error
     note(f"written: {output}")

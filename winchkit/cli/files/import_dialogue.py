@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 
 def asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
-    """Ask the open questions on the terminal, and guess again with the answers.
-
-    Returns: (Guess, Answers).
-    """
+    """Ask the open questions on the terminal, and guess again with the answers."""
     from winchkit.cli.files.import_table import tables_text
     from winchkit.runs.importing.guess import guess_columns
 

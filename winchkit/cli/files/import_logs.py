@@ -19,7 +19,7 @@ from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
 from winchkit.cli.files.import_runs import inspected, targets_in, targets_of, write_runs
 from winchkit.cli.files.import_table import together
-from winchkit.errors import Fault, FileError, RunError, UsageError
+from winchkit.errors import FileError, RunError, UsageError, of_each
 
 if TYPE_CHECKING:
     from winchkit.runs.importing.assignment import Guess
@@ -276,16 +276,11 @@ def _tables(files: Sequence[str], devices: Sequence[str]) -> list[ColumnTable]:
     from winchkit.cli.files.import_trace import read_trace_table
     from winchkit.runs.importing.formats.source import read_table
 
-    faults: list[Fault] = []
-    tables = []
-    for file in files:
+    def read(file: str) -> ColumnTable:
         is_trace = bool(devices) and bool(trace_advice(Path(file)))
-        try:
-            tables.append(read_trace_table(file, devices) if is_trace else read_table(file))
-        except FileError as error:
-            faults += error.faults
-    if faults:
-        raise RunError(faults)
+        return read_trace_table(file, devices) if is_trace else read_table(file)
+
+    tables = of_each(read, files, RunError)
     if devices and not any(table.layout.startswith("trace of CAN frames") for table in tables):
         raise UsageError("--device is of traces of CAN frames, and no FILE is one")
     return tables

@@ -11,7 +11,8 @@ import click
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import is_json
 from winchkit.cli.files.import_table import together
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import UsageError
+from winchkit.regular_file import file_errors
 
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
@@ -71,10 +72,8 @@ def write_runs(
     from winchkit.runs.info import summary_of
     from winchkit.runs.writer import write_run
 
-    try:
+    with file_errors(folder, "made"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
     entries: list[dict[str, Any]] = []
     for (_, run), target in zip(results, targets, strict=True):
         write_run(run, target, replace=True)

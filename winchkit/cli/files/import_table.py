@@ -35,10 +35,7 @@ def shortened(paths: Sequence[str]) -> str:
 
 
 def together(pairs: Iterable[tuple[str, str]]) -> list[str]:
-    """A line for each different text, with its files; one for texts that differ in numbers alone.
-
-    ``pairs``: file and text. Texts that differ in numbers are put together where there are many.
-    """
+    """A line for each different text, with its files; many that differ in numbers alone are one."""
     told = list(dict.fromkeys((one_line(path), text) for path, text in pairs))
     is_many = len({text for _, text in told}) > _MOST
     found: dict[str, list[tuple[str, str]]] = {}
@@ -66,10 +63,7 @@ def alike(guesses: Sequence[Guess]) -> list[list[Guess]]:
 
 
 def tables_text(group: Sequence[Guess]) -> str:
-    """The guess of files of one kind as text: a line per column, notes, and what is not known.
-
-    Returns: columns that are not used stand at the end.
-    """
+    """The guess of files of one kind: a line per column, unused ones last, notes, and questions."""
     from winchkit.report.words.columns import aligned
 
     guess = group[0]
@@ -134,10 +128,7 @@ def _row(item: Assignment, column: FileColumn) -> tuple[str, ...]:
 
 
 def entry_of(guess: Guess) -> dict[str, Any]:
-    """The guess of one file for JSON.
-
-    Returns: every column with its channel (null where it is not used), factor and origin.
-    """
+    """The guess of one file for JSON."""
     table = guess.table
     columns = {column.source: column for column in table.columns}
     return {

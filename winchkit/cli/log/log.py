@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,7 +139,7 @@ def _follow(bench: str, log: _Log, effects: Sequence[str]) -> None:
     if not spec.cells:
         watch(bench, "log", log.follow, log.lose, effects)
         return
-    if log.has_sinks:
+    if log.sinks:
         raise UsageError(
             f"bench '{spec.name}' has instruments only, of which there are no live pictures; leave "
             "out --jsonl and --udp, and name a file by -o"
@@ -149,32 +150,51 @@ def _follow(bench: str, log: _Log, effects: Sequence[str]) -> None:
         log.follow(station)
 
 
+class _Silences:
+    """Reports drives and instruments whose samples cease while a log is written."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, dict[str, Any]] = {}
+
+    def note(self, silent: dict[str, dict[str, Any]]) -> None:
+        """Report what has changed of the silences, by source (``A.cell``)."""
+        for name, found in silent.items():
+            before = self._known.get(name, {"times": 0, "now": 0.0})
+            if found["now"] and found["times"] > before["times"]:
+                said = f"{name}: no sample for {found['now']:.1f} s; the log goes on without it"
+                click.echo(f"winchkit: {said}", err=True)
+            elif before["now"] and not found["now"]:
+                click.echo(f"winchkit: {name}: samples again", err=True)
+        self._known = silent
+
+    @property
+    def summary(self) -> list[str]:
+        """A line for each that was silent at any time."""
+        return [
+            f"{name} was silent {found['times']} time{'s' * (found['times'] != 1)}, for "
+            f"{found['longest']:.1f} s at most"
+            + (f", and at the end of the log for {found['now']:.1f} s" if found["now"] else "")
+            for name, found in self._known.items()
+        ]
+
+
+@dataclass
 class _Log:
     """A log over the life of one or several owners of the bench, each of which writes a file."""
 
-    def __init__(
-        self,
-        output: str | None,
-        rotate: str | None,
-        replace: bool,
-        limit: float | None,
-        pause: float,
-        sinks: list[LiveSink],
-    ) -> None:
-        self.files: dict[str, int] = {}
-        """Rows by file."""
-        self.terminated: Terminated | None = None
-        """SIGTERM, SIGHUP or a closed terminal, where one has ended it; Ctrl-C is its usual end."""
-        self._output, self._rotate, self._replace = output, rotate, replace
-        self._limit, self._pause, self._sinks = limit, pause, sinks
-        self._counted: dict[str, dict[str, Any]] = {}
-        self.silences = _Silences()
-        self._start = 0.0
-
-    @property
-    def has_sinks(self) -> bool:
-        """Whether live pictures are wanted."""
-        return bool(self._sinks)
+    _output: str | None
+    _rotate: str | None
+    _replace: bool
+    _limit: float | None
+    _pause: float
+    sinks: list[LiveSink]
+    files: dict[str, int] = field(default_factory=dict)
+    """Rows by file."""
+    terminated: Terminated | None = None
+    """SIGTERM, SIGHUP or a closed terminal, where one has ended it; Ctrl-C is its usual end."""
+    silences: _Silences = field(default_factory=_Silences)
+    _counted: dict[str, dict[str, Any]] = field(default_factory=dict)
+    _start: float = 0.0
 
     @property
     def result(self) -> dict[str, Any]:
@@ -237,10 +257,10 @@ class _Log:
             if file:
                 self.files[file] = rows
                 self._note_counters(station)
-            status = station.status() if self._sinks else {"cycle": seen}
+            status = station.status() if self.sinks else {"cycle": seen}
             if status["cycle"] != seen:
                 seen = status["cycle"]
-                for sink in self._sinks:
+                for sink in self.sinks:
                     sink(status)
             show()
 
@@ -254,34 +274,6 @@ class _Log:
             if not _earlier(str(following)):
                 return str(following)
             number += 1
-
-
-class _Silences:
-    """Reports drives and instruments whose samples cease while a log is written."""
-
-    def __init__(self) -> None:
-        self._known: dict[str, dict[str, Any]] = {}
-
-    def note(self, silent: dict[str, dict[str, Any]]) -> None:
-        """Report what has changed of the silences, by source (``A.cell``)."""
-        for name, found in silent.items():
-            before = self._known.get(name, {"times": 0, "now": 0.0})
-            if found["now"] and found["times"] > before["times"]:
-                said = f"{name}: no sample for {found['now']:.1f} s; the log goes on without it"
-                click.echo(f"winchkit: {said}", err=True)
-            elif before["now"] and not found["now"]:
-                click.echo(f"winchkit: {name}: samples again", err=True)
-        self._known = silent
-
-    @property
-    def summary(self) -> list[str]:
-        """A line for each that was silent at any time."""
-        return [
-            f"{name} was silent {found['times']} time{'s' * (found['times'] != 1)}, for "
-            f"{found['longest']:.1f} s at most"
-            + (f", and at the end of the log for {found['now']:.1f} s" if found["now"] else "")
-            for name, found in self._known.items()
-        ]
 
 
 def _earlier(output: str) -> list[Path]:

@@ -15,8 +15,8 @@ from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import PROFILE, RUN, checked, own_effects_option
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.cli.core.options import PROFILE, RUN, all_of, checked, own_effects_option
+from winchkit.errors import Fault, FileError, UsageError, of_each
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
@@ -44,16 +44,16 @@ def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
     )
 
 
-_MODEL_OPTIONS = (
-    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
+_MODEL_OPTIONS = all_of(
+    profile_option,
+    own_effects_option(),
+    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
     click.option(
         "--predicted",
         metavar="OUTPUT=COLUMN",
         help="Column of another model's prediction: motor_torque=tau_model.",
     ),
-    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
-    own_effects_option(),
-    profile_option,
+    click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
 )
 
 
@@ -91,10 +91,7 @@ class Asked:
     def runs(
         self, paths: Sequence[str], declared: WinchProfile | RobotProfile | None = None
     ) -> list[Run]:
-        """Runs of the one winch, or of all lines of a robot.
-
-        Raises FileError with the faults of all files.
-        """
+        """Runs of the one winch, or of all lines of a robot; FileError with all faults."""
         if declared is not None and wings.call("compare", declared) is not None:
             if self.predicted is not None:
                 raise UsageError("--predicted: is of one winch or axis, not of a robot")
@@ -164,10 +161,7 @@ def model_options(function: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         return function(asked=Asked(profile, effect_files, winch, band, predicted), **others)
 
-    command: Callable[..., Any] = bundled
-    for option in _MODEL_OPTIONS:
-        command = option(command)
-    return command
+    return _MODEL_OPTIONS(bundled)
 
 
 def read_runs(paths: Sequence[str], winch: str | None) -> list[Run]:
@@ -189,16 +183,7 @@ def read_all(paths: Sequence[str]) -> list[Run]:
     """Runs with all that they hold. Raises FileError with the faults of all files."""
     from winchkit.runs import read_run
 
-    runs: list[Run] = []
-    faults: list[Fault] = []
-    for path in paths:
-        try:
-            runs.append(read_run(path))
-        except FileError as error:
-            faults += error.faults
-    if faults:
-        raise FileError(faults)
-    return runs
+    return of_each(read_run, paths)
 
 
 def _of_winch(run: Run, winch: str | None) -> Run:
@@ -292,10 +277,7 @@ def save_page(path: str, page: str) -> None:
 
 
 def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
-    """Names of the winches' own pages beside the page of all: ``report-A.html``.
-
-    Raises UsageError where two winches would get one page.
-    """
+    """Pages beside that of all, ``report-A.html``; UsageError where two winches would get one."""
     page = Path(path)
     names = {w: f"{page.stem}-{_NO_FILE.sub('-', w) or 'winch'}{page.suffix}" for w in winches}
     if len(set(names.values())) < len(names):
@@ -305,12 +287,10 @@ def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
 
 def page_title(profile: str, runs: Sequence[str], effect: str = "") -> str:
     """``bench-spiral: a.csv, b.csv``, or ``bench-spiral: 12 runs, a.csv to l.csv``."""
+    from winchkit.report.words.vocabulary import runs_listed
+
     added = f" with {effect}" if effect else ""
-    names = [Path(run).name for run in runs]
-    named = ", ".join(names)
-    if len(names) > _RUNS_NAMED:
-        named = f"{len(names)} runs, {names[0]} to {names[-1]}"
-    return f"{profile}{added}: {named}"
+    return f"{profile}{added}: {runs_listed([Path(run).name for run in runs], _RUNS_NAMED)}"
 
 
 def _may_be_replaced(target: Path) -> bool:

@@ -12,6 +12,7 @@ from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import Decorator, all_of
 from winchkit.cli.core.output import is_json, json_flag
 from winchkit.cli.core.standard_input import may_ask
 from winchkit.errors import UsageError
@@ -50,15 +51,10 @@ def command() -> None:
     """Profiles of your own: drum, gearbox, cable, pulleys and reference of a winch in a file."""
 
 
-def _options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """An option for every field."""
-    for field in reversed(FIELDS):
-        drums = "" if len(field.drums) == len(DRUMS) else f" ({', '.join(field.drums)})"
-        words = f"{field.words[0].upper()}{field.words[1:]}{drums}, such as '{field.example}'."
-        place = "_".join(field.place)
-        option = click.option(field.option, place, metavar="VALUE", help=words)
-        function = option(function)
-    return function
+def _option(field: Field) -> Decorator:
+    drums = "" if len(field.drums) == len(DRUMS) else f" ({', '.join(field.drums)})"
+    words = f"{field.words[0].upper()}{field.words[1:]}{drums}, such as '{field.example}'."
+    return click.option(field.option, "_".join(field.place), metavar="VALUE", help=words)
 
 
 @click.command(
@@ -71,7 +67,7 @@ def _options(function: Callable[..., Any]) -> Callable[..., Any]:
     ),
 )
 @click.argument("file", metavar="FILE.toml")
-@_options
+@all_of(*map(_option, FIELDS))
 @click.option(
     "--pulley",
     "pulleys",

@@ -74,7 +74,7 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
         runs = [read_run(path) for path in paths]
         comparison = compare(runs, read_profile(find("profiles", profile_name)))
         findings = demo_loop.learn(runs, profile_name, out)
-    truth = demo_loop.truth_of(bench)
+    truth = bench.answers
     right = findings.right(truth)
     hidden = ", ".join(truth) or "nothing"
     story.add(sentence(findings.answer.diagnosis))

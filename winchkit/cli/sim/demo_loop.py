@@ -66,17 +66,8 @@ def programmes() -> list[Programme]:
     return [read_programme(find("sim", name)) for name in PROGRAMMES]
 
 
-def truth_of(bench: SimBench) -> tuple[str, ...]:
-    """Catalogue ids of the hidden effects; used only after the diagnosis."""
-    return tuple(a for t in bench.truth.values() for spec in t.hidden for a in spec.answers)
-
-
 def record(bench: SimBench, seed: int, folder: Path, report: ProgressCallback) -> list[Path]:
-    """Run the programmes on a simulated bench, with CAN frames and Modbus transactions.
-
-    Time is simulated: it advances as fast as this computer can. Raises MotionError where the
-    control loop was late nevertheless: such runs are not valid.
-    """
+    """Run the programmes on a simulated bench, in simulated time; MotionError where it was late."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.programme import run_programme
     from winchkit.errors import MotionError

@@ -100,10 +100,7 @@ def command(
 def _check_files(
     runs: Sequence[str], profile: str | None, bench: str | None, simulated: str | None
 ) -> None:
-    """Raise FileError for a file that was named and is none, before the page loads its packages.
-
-    What a run file contains is the page's subject: it names its faults, and opens the others.
-    """
+    """Raise FileError for a file that was named and is none, before the page loads its packages."""
     from winchkit.schema.read import read_bench, read_simbench
 
     for run in runs:

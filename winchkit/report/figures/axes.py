@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.quantity_text import plain
 from winchkit.report.figures.figure import FigureAxis
-from winchkit.report.words.vocabulary import VARIABLE_NAMES
+from winchkit.report.words.vocabulary import variable_name
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Round steps between ticks, of one decade."""
@@ -134,11 +134,8 @@ _WITH_A_SIGN = {
 
 
 def reading(variable: str, *, within_turn: bool = False) -> AxisLabel:
-    """Unit and name of a variable; an angle within its turn in degrees, else in turns.
-
-    ``within_turn``: also whether a position is drawn within its period.
-    """
-    name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
+    """Unit and name of a variable; an angle ``within_turn`` in degrees, else in turns."""
+    name = variable_name(variable)
     if variable in ANGLES:
         within = AxisLabel(f"{name} within its turn", "°", _TURN / _DEGREES)
         return within if within_turn else AxisLabel(name, "turns", _TURN)

@@ -40,10 +40,7 @@ def require_png() -> None:
 
 
 def write_figures(figures: Iterable[Figure], folder: Path, prefix: str = "") -> list[Path]:
-    """Write every figure as SVG, PNG and CSV.
-
-    Raises FileError where a file cannot be written.
-    """
+    """Write every figure as SVG, PNG and CSV; raises FileError."""
     written = []
     try:
         folder.mkdir(exist_ok=True)

@@ -1,8 +1,4 @@
-"""A figure as data: series, bands, cells and labels over common axes, without any drawing.
-
-:mod:`winchkit.report.figures.layout` places it, :mod:`winchkit.report.figures.export` writes it as
-SVG, PNG and CSV. Values are in the units of their axes.
-"""
+"""A figure as data in the units of its axes: series, bands, cells and labels, not drawn."""
 
 from __future__ import annotations
 
@@ -162,21 +158,17 @@ class Figure:
 def _series_table(figure: Figure) -> FigureData:
     """Rows of every set of series with one x, in sequence; a column per series."""
     every = [(panel, one) for panel in figure.panels for one in panel.series if one.name]
-    groups: list[tuple[Array, list[int]]] = []
+    groups: dict[int, list[int]] = {}
     for index, (_, one) in enumerate(every):
-        own = next((g for g in groups if g[0] is one.x), None)
-        if own is None:
-            groups.append((one.x, own_indices := []))
-            own_indices.append(index)
-        else:
-            own[1].append(index)
-    x = np.concatenate([x for x, _ in groups]) if groups else np.zeros(0)
+        groups.setdefault(id(one.x), []).append(index)
+    x = np.concatenate([np.zeros(0), *(every[own[0]][1].x for own in groups.values())])
     columns = [np.full(len(x), np.nan) for _ in every]
     at = 0
-    for own_x, indices in groups:
-        for index in indices:
-            columns[index][at : at + len(own_x)] = every[index][1].y
-        at += len(own_x)
+    for own in groups.values():
+        end = at + len(every[own[0]][1].x)
+        for index in own:
+            columns[index][at:end] = every[index][1].y
+        at = end
     head = [figure.x.label, *(headed(one.name, panel.y.unit) for panel, one in every)]
     data = [_numbers(column) for column in (x, *columns)]
     if figure.names:

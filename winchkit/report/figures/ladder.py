@@ -12,7 +12,7 @@ from winchkit.diagnosis.results import Comparison, Diagnosis, OutputError, Outpu
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.vocabulary import output_name
 
 _ROW = 30.0
 """px per output: a line of text and a bar."""
@@ -40,7 +40,7 @@ def error_ladder(
     rows = [
         row
         for name in worst_outputs(outputs)
-        if (row := _row(OUTPUT_NAMES.get(name, name), outputs[name])) is not None
+        if (row := _row(output_name(name), outputs[name])) is not None
     ]
     if not rows:
         return None
@@ -62,7 +62,7 @@ def fleet_ladders(
             and (row := _row(winch or "the winch", one.outputs[output], _named(one))) is not None
         ]
         if rows:
-            name = OUTPUT_NAMES.get(output, output)
+            name = output_name(output)
             extended = any(_named(one) for one in found.values())
             title = capital(f"{name}: error over the noise")
             changed = "with named effects" if extended else ""

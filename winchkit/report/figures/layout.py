@@ -39,7 +39,6 @@ _CHARACTER = 0.55
 """Mean width of a character in its height, of sans-serif fonts."""
 _BOLD = 1.16
 """Width of bold text over that of regular text, of the widest usual sans-serif (DejaVu)."""
-"""Mean width of a character as a share of the font size."""
 _PER_TICK_X, _PER_TICK_Y = 80, 48
 """px between two ticks at least, so that their labels do not touch."""
 _SCALE_STEP = 34

@@ -13,12 +13,12 @@ from winchkit.report.figures.axes import AxisLabel, reading
 from winchkit.report.figures.figure import Figure, GridCells, Panel
 from winchkit.report.figures.layout import signed_levels
 from winchkit.report.figures.residuals import Residuals
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.vocabulary import output_name, variable_name
 
 
 def map_text(drawn: ResidualMap, scale: PrintScale) -> str:
     """``over free length and load 93 %, most +1.2 mm at 3 m, 196 N``."""
-    names = " and ".join(_name(name) for name in drawn.over)
+    names = " and ".join(variable_name(name) for name in drawn.over)
     return f"over {names} {percent(drawn.share)}, {largest_text(drawn, scale)}"
 
 
@@ -36,10 +36,6 @@ def largest_text(drawn: ResidualMap, scale: PrintScale) -> str:
 def map_reading(variable: str) -> AxisLabel:
     """Axis text of a map's variable; an angle is taken within its turn."""
     return reading(variable, within_turn=variable in ANGLES)
-
-
-def _name(variable: str) -> str:
-    return VARIABLE_NAMES.get(variable, variable.replace("_", " "))
 
 
 def _place(how: AxisLabel, value: float) -> str:
@@ -90,8 +86,8 @@ def _figure(
 ) -> Figure:
     readings = [map_reading(name) for name in drawn.over]
     x, y = (np.asarray(r.shown(edges)) for r, edges in zip(readings, drawn.edges, strict=True))
-    output = OUTPUT_NAMES.get(drawn.output, drawn.output)
-    over = " and ".join(_name(name) for name in drawn.over)
+    output = output_name(drawn.output)
+    over = " and ".join(variable_name(name) for name in drawn.over)
     cells = GridCells(
         "mean residual",
         scale.label,

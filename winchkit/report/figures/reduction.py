@@ -29,12 +29,10 @@ _FEW = 5
 
 
 def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
-    """Indices of the samples that a drawing keeps: the extremes of every interval.
+    """Indices (m,) of the samples that a drawing keeps: extremes of each series per interval.
 
-    ``series``, sequence of (n,) array: NaN where missing. ``intervals``: number of intervals of
-    equal counts. Returns (m,) of int: sorted; the minimum and the maximum of every series in every
-    interval, a missing sample of an interval without any value, and the first and the last sample.
-    All samples where these are fewer.
+    A missing sample stands for an interval without any value; the first and the last sample are
+    kept, and all samples where these are fewer.
     """
     count = len(series[0])
     if count <= 2 * intervals * len(series):
@@ -53,10 +51,7 @@ def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
 
 
 def filled_edges(x: Array, bins: int) -> Array:
-    """Inner edges of at most ``bins`` equally filled bins; between values where these are few.
-
-    x is (n,) and finite.
-    """
+    """Inner edges of at most ``bins`` equally filled bins; between values where these are few."""
     distinct = np.unique(x)
     if len(distinct) <= _FEW:
         return np.asarray((distinct[1:] + distinct[:-1]) / 2)
@@ -64,10 +59,7 @@ def filled_edges(x: Array, bins: int) -> Array:
 
 
 def bin_means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list[Array]]:
-    """Mean x of every bin that holds samples and, per signal, its mean there.
-
-    x and each signal are (n,) and finite, ``edges`` are inner and sorted.
-    """
+    """Mean x of every bin that holds samples and, per signal, its mean there; all (n,), finite."""
     index = np.searchsorted(edges, x, side="right")
     count = np.bincount(index)
     used = count > 0
@@ -109,10 +101,7 @@ class ResidualCurve:
 
 
 def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Attribution]:
-    """Main variable of each output's residual: a clear order, else the largest share.
-
-    Returns: by the name of the output in results.
-    """
+    """Main variable of each output's residual: a clear order, else the largest share."""
     orders = [f for f in harmonics(regression, residual) if f.share > CLEAR_ORDER]
     trends = [f for f in attributions(regression, residual) if f.share > _WORTH_DRAWING]
     out: dict[str, Attribution] = {}
@@ -141,21 +130,14 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attributio
 
 
 def period_of(over: Attribution) -> float | None:
-    """Range within which a residual with an order is drawn: rad, of a position m.
-
-    Returns: one turn of an angle; one period of a position, which has no turn; None without an
-    order.
-    """
+    """Range within which a residual with an order is drawn: one turn, rad, or one period, m."""
     if over.order is None:
         return None
     return 2 * np.pi if over.variable in ANGLES else 2 * np.pi / over.order
 
 
 def bin_edges(values: Array, over: Attribution, period: float | None, bins: int = _BINS) -> Array:
-    """Inner edges: equal within a period, fine enough for an order; else ``bins`` equally filled.
-
-    ``period``: that of :func:`period_of` in the unit of the values; None without one.
-    """
+    """Inner edges: equal within a ``period``, fine enough for an order; else equally filled."""
     if over.order is None or period is None:
         return filled_edges(values, bins)
     periods = over.order if over.variable in ANGLES else 1

@@ -36,7 +36,7 @@ from winchkit.report.figures.reduction import (
     strongest,
 )
 from winchkit.report.words.sentence import capital, often_per_turn
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.vocabulary import output_name, variable_name
 from winchkit.schema.linear_axis import rotary_name
 from winchkit.units import GRAVITY
 
@@ -216,7 +216,7 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
     if len(errors) == 1:
         signals[1] = replace(signals[1], name="predicted", legend="predicted, residual")
         errors[0] = replace(errors[0], name="residual", legend="predicted, residual")
-    name = capital(OUTPUT_NAMES.get(curves.output, curves.output))
+    name = capital(output_name(curves.output))
     noise = None if curves.noise is None else curves.noise / curves.scale.worth
     filtered = _filtered(regression, curves)
     whole = sum(len(part) for part in curves.before)
@@ -302,8 +302,8 @@ def _over_variable(
     else:
         cells, limits = _density(x, first, how.logarithmic, limits)
     noise = None if curves.noise is None else curves.noise / curves.scale.worth
-    output = OUTPUT_NAMES.get(curves.output, curves.output)
-    over = VARIABLE_NAMES.get(followed.variable, followed.variable)
+    output = output_name(curves.output)
+    over = variable_name(followed.variable)
     over = "time in the run" if followed.variable == "time" else over
     often = ""
     if followed.order is not None:

@@ -15,7 +15,7 @@ from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Pan
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, variable_name
+from winchkit.report.words.vocabulary import output_name, variable_name
 
 
 def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]:
@@ -43,8 +43,8 @@ def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
     noise = None
     if isinstance(answer, WinchAnswer):
         noise = answer.diagnosis.outputs[where.output].noise_rms
-    output = OUTPUT_NAMES.get(where.output, where.output)
-    over = VARIABLE_NAMES.get(where.variable, where.variable)
+    output = output_name(where.output)
+    over = variable_name(where.variable)
     means = FigureSeries("residual, mean", "today", how.shown(at), residual / scale.worth, "mean")
     band = None if noise is None else noise / scale.worth
     return Figure(
@@ -86,7 +86,7 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
     law = curve_of(regression, without - answer.result.final.residual, over)
     how = reading(over.variable, within_turn=over.order is not None)
     scale = scale_for(3 * float(abs(at.mean).max()), LADDER_UNITS[over.output])
-    output, variable = OUTPUT_NAMES.get(over.output, over.output), variable_name(over.variable)
+    output, variable = output_name(over.output), variable_name(over.variable)
     drawn = tuple(
         FigureSeries(name, tone, how.shown(curve.x), curve.mean / scale.worth, "mean")
         for name, tone, curve in (("to explain, mean", "today", at), (step.effects[0], "with", law))

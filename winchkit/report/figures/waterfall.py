@@ -66,10 +66,9 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
 
 
 def errors_without(answer: Answer) -> list[Mapping[str, float]]:
-    """Held-out errors of the final model without each step, refitted, by output.
+    """Held-out errors of the final model without each step, refitted, by output; empty for none.
 
-    A refitted value of the profile is set back to that of the file. Empty for a step that cannot be
-    taken out by itself.
+    A refitted value of the profile is set back to that of the file.
     """
     engine, result = answer.engine, answer.result
     hypothesis, count = result.final.hypothesis, _n_own(answer)

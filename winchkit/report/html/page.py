@@ -24,11 +24,7 @@ _FILES = ("PNG", "SVG", "CSV")
 
 
 def page(title: str, figures: Sequence[Figure], *content: Markup, headed: bool = True) -> str:
-    """A whole page: title, content, and the data of its figures.
-
-    ``figures``: figures that the content shows by :func:`figure_block`. ``headed``: else the
-    content has its own.
-    """
+    """A whole page: title (unless the content is ``headed`` itself), content, and figures' data."""
     day = element("p", f"winchkit, {date.today()}", class_="quiet")
     head = [element("header", element("h1", title), day)] if headed else []
     script = _script(figures) if figures else []

@@ -16,10 +16,7 @@ _LEFT_OUT = {"name", "description", "ledger", "effect", "rules"}
 
 
 def declared_rows(profile: Any) -> list[list[str]]:
-    """Parts of a profile with the values that differ from the defaults, a row each.
-
-    Parts of one kind have all of their quantities, so that rows can be compared.
-    """
+    """Parts of a profile with the values that differ from the defaults; all values of its kind."""
     rows = []
     for field in dataclasses.fields(profile):
         if field.name in _LEFT_OUT or not field.init:

@@ -48,11 +48,7 @@ def result_figure(
     run: str | Sequence[str] | None = None,
     figsize: Size = None,
 ) -> Figure:
-    """Measured and predicted over time with the residual and the noise band below.
-
-    ``output``, ``run``: by default all, runs one after the other. ``figsize``: width and height,
-    inches. Returns: two axes per output.
-    """
+    """Measured and predicted over time, with the residual and the noise band below."""
     traces = _chosen(result.traces, output, run)
     noise = {name: fit.noise_rms for name, fit in result.outputs.items()}
     if any(isinstance(trace, PoseTrace) for trace in traces):
@@ -80,11 +76,7 @@ def result_figure(
 def run_figure(
     run: Run, *, channels: str | Sequence[str] | None = None, figsize: Size = None
 ) -> Figure:
-    """Channels of a run over time.
-
-    ``channels``: by default the first eight with numbers. ``figsize``: width and height, inches.
-    Returns: one axis per channel.
-    """
+    """Channels of a run over time, by default the first eight with numbers; one axis each."""
     there = [name for name in run if np.isfinite(run[name]).any()]
     names = there[:_CHANNELS] if channels is None else _known(channels, list(run), "channel")
     if not names:
@@ -104,10 +96,7 @@ def run_figure(
 
 
 def winch_figure(profile: WinchProfile, *, figsize: Size = None) -> Figure:
-    """Motor angle, and cable per drum angle, over the cable length.
-
-    ``figsize``: width and height, inches.
-    """
+    """Motor angle, and cable per drum angle, over the cable length."""
     longest = profile.reference.cable_length
     if isinstance(profile, AxisProfile) or not longest:
         raise UsageError(

@@ -18,10 +18,10 @@ from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.notebook.text import plan_screen, run_head, run_rows
 from winchkit.report.words.sentence import sentence
 from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
     VERDICT_NAMES,
     error_scale,
     meaning,
+    output_name,
     values_text,
 )
 from winchkit.runs.run import Run
@@ -99,7 +99,7 @@ def addition_cell(addition: Addition | Removal) -> str:
         scale = error_scale(output)
         sizes = (output.heldout_rms_before, output.heldout_rms_after)
         noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
-        errors.append([OUTPUT_NAMES.get(name, name), *map(scale.text, sizes), noise])
+        errors.append([output_name(name), *map(scale.text, sizes), noise])
     return framed(
         TONES["explained"],
         table("Effects of the new profile.", ["effect", "meaning", "values"], rows, words=3),

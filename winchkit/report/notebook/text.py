@@ -10,10 +10,15 @@ from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.quantity_text import grouped, percent, significant
 from winchkit.report.notebook.declarations import declared_rows
-from winchkit.report.text import addition_text, compare_text, error_lines, head_lines, step_lines
+from winchkit.report.text import (
+    addition_text,
+    compare_text,
+    diagnosed_errors,
+    head_lines,
+    step_lines,
+)
 from winchkit.report.words.columns import aligned, hanging, joined, paragraph
 from winchkit.report.words.sentence import changes_text, remaining_text
-from winchkit.report.words.steps import reported_steps
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
@@ -86,12 +91,7 @@ def diagnosis_screen(diagnosis: Diagnosis) -> str:
     blocks = [
         head_lines(diagnosis),
         step_lines(diagnosis),
-        error_lines(
-            diagnosis.outputs,
-            extended=bool(reported_steps(diagnosis)),
-            data=diagnosis.data,
-            offsets=diagnosis.run_offsets,
-        ),
+        diagnosed_errors(diagnosis),
         paragraph(remaining_text(diagnosis)),
         [] if diagnosis.interrupted else paragraph(changes_text(diagnosis)),
     ]

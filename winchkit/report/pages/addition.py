@@ -21,7 +21,7 @@ from winchkit.report.words.sentence import (
     still_text,
     worse_text,
 )
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, error_scale, meaning, values_text
+from winchkit.report.words.vocabulary import error_scale, meaning, output_name, values_text
 
 
 def addition_sections(
@@ -106,7 +106,7 @@ def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
         noise = output.noise_rms
         rows.append(
             [
-                OUTPUT_NAMES.get(name, name),
+                output_name(name),
                 *(
                     element("span", scale.text(error), class_=tone)
                     for error, tone in zip(errors, ("before", "after"), strict=True)

@@ -15,7 +15,7 @@ from winchkit.report.pages.parts import bullets, code_block, compared_text, data
 from winchkit.report.reproducibility import CommandLine, repeat
 from winchkit.report.words.headline import at_noise, comparison_headline, worst_outputs
 from winchkit.report.words.sentence import capital, often_per_turn
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.vocabulary import output_name, variable_name
 
 _NEXT = (
     "A comparison quantifies the error, not its cause. This command names the missing effect, or "
@@ -54,7 +54,7 @@ def comparison_sections(
 def distance_text(name: str, error: OutputError, over: Attribution | None) -> str:
     """Error of one output, its ratio to the noise, and its attribution."""
     size = f"{quantity(error.rms, error.unit)} rms"
-    off = f"The error of the {OUTPUT_NAMES.get(name, name)} is {size}"
+    off = f"The error of the {output_name(name)} is {size}"
     if error.noise_rms is None:
         return f"{off}; its noise is unknown without repeats; {_attributed(over)}."
     noise = f"its noise of {quantity(error.noise_rms, error.unit)}"
@@ -71,7 +71,7 @@ def _attributed(over: Attribution | None) -> str:
     share = f"({percent(over.share)} of its variance)"
     if over.order is not None:
         return f"it has {often_per_turn(over.variable, over.order)} {share}"
-    return f"it depends on {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
+    return f"it depends on {variable_name(over.variable)} {share}"
 
 
 def _lead(
@@ -106,7 +106,7 @@ def _sizes(comparison: Comparison) -> Markup:
         noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
         size = element("span", scale.text(error.rms), class_="before")
         measured = quantity(error.signal_rms, error.unit)
-        rows.append([OUTPUT_NAMES.get(name, name), size, noise, _ratio(error), measured])
+        rows.append([output_name(name), size, noise, _ratio(error), measured])
     head = ["output", "error, rms", "noise", "÷ noise", "measured"]
     return table("Measured less predicted, with the values of the profile's file.", head, rows)
 
@@ -115,7 +115,7 @@ def _table(comparison: Comparison) -> Markup:
     sizes = {row[0]: row[1:] for row in size_rows(comparison)}
     rows = []
     for name in worst_outputs(comparison.outputs):
-        error, words = comparison.outputs[name], OUTPUT_NAMES.get(name, name)
+        error, words = comparison.outputs[name], output_name(name)
         rows.append([words, unbroken(followed(error)), *sizes[words], _ratio(error)])
     caption = (
         "Measured less predicted, with the values of the profile's file. Shares are those of the "

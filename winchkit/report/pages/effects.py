@@ -16,7 +16,13 @@ from winchkit.report.figures.reduction import decimated
 from winchkit.report.html.markup import Markup, element, facts, formula, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, parameter_name
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    listed,
+    meaning,
+    output_name,
+    parameter_name,
+)
 
 _INTERVALS = 120
 """Intervals of the drawn signature, each with its lowest and highest value."""
@@ -56,7 +62,7 @@ def _card(effect: Effect, drawing: Sequence[Markup]) -> Markup:
     pairs = [
         ("formula", formula(effect.formula)),
         ("source", effect.source),
-        ("changes", listed([OUTPUT_NAMES.get(name, name) for name in effect.outputs])),
+        ("changes", listed([output_name(name) for name in effect.outputs])),
         ("needs", "; ".join(NEED_WORDS[need] for need in effect.needs) or "only the motor angle"),
         ("family", effect.family),
         ("contains", listed(list(effect.contains))),
@@ -128,7 +134,7 @@ def _figure(effect: str, drawn: Signature, output: str, over: FigureAxis) -> Fig
     unit = OUTPUT_UNITS[output] if output else "m"
     scale = scale_for(float(np.nanmax(np.abs(values))), unit)
     rows = decimated([values], _INTERVALS)
-    name = OUTPUT_NAMES.get(output, output)
+    name = output_name(output)
     caption = (
         f"Change of the {name}." if output else "Free length of the nominal line, for orientation."
     )

@@ -14,7 +14,7 @@ from winchkit.report.html.markup import Markup, details, element, facts
 from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
+from winchkit.report.words.vocabulary import listed, output_name
 
 _ICONS = {
     "adequate": '<circle cx="8" cy="8" r="6"/><path d="M5.2 8.2l2 2 3.6-4.2"/>',
@@ -41,10 +41,9 @@ def lead(
     rows: Sequence[tuple[str, str]],
     *beside: Markup,
 ) -> Markup:
-    """Result of a page: a word, a headline, and a summary of the comparison and its consequences.
+    """Result of a page: a word, a headline, and a summary of questions and answers, if any.
 
     ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown, undecided.
-    ``rows`` are questions and their answers; empty answers are left out.
     """
     icon = Markup(f'<svg viewBox="0 0 16 16" aria-hidden="true">{_ICONS[tone]}</svg>')
     head = element(
@@ -145,7 +144,7 @@ def output_card(
     output: str, content: Sequence[Markup], sizes: Mapping[str, str], *, opened: bool
 ) -> Markup:
     """The figures of an output; the first card is open, the others are to be opened."""
-    title = capital(OUTPUT_NAMES.get(output, output))
+    title = capital(output_name(output))
     size = element("span", unbroken(sizes.get(output, "")), class_="beside")
     if opened:
         return element("div", element("h2", title, " ", size), *content, class_="output")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from winchkit.quantity_text import percent
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.vocabulary import output_name, runs_listed
 from winchkit.runs.sanity.finding import Finding
 
 _CAVEATS = {
@@ -32,11 +32,7 @@ def caveat_text(code: str) -> str:
 
 
 def finding_texts(findings: Sequence[Finding]) -> list[str]:
-    """Findings as lines, equal ones of several runs in one, alike ones of many runs shortened.
-
-    ``findings``: in order of importance. Returns: one line per channel and text, with the runs that
-    it applies to.
-    """
+    """Findings, the most important first; a line per channel and text, with its runs."""
     runs: dict[tuple[str, str], dict[str, list[str]]] = {}
     for finding in findings:
         alike = runs.setdefault((finding.channel, finding.code), {})
@@ -56,17 +52,10 @@ def _alike(channel: str, texts: Mapping[str, list[str]]) -> Iterator[str]:
 
 def used_text(used: Mapping[str, float]) -> str:
     """Share of the samples that is compared, by output; empty where it is not known."""
-    shares = [f"{OUTPUT_NAMES.get(name, name)} {percent(share)}" for name, share in used.items()]
+    shares = [f"{output_name(name)} {percent(share)}" for name, share in used.items()]
     return f"compared samples: {', '.join(shares)}" if shares else ""
 
 
 def _place(runs: Sequence[str], channel: str) -> str:
     named = [name for name in dict.fromkeys(runs) if name]
-    if not named:
-        return channel
-    few = (
-        ", ".join(named)
-        if len(named) <= _SHOWN
-        else f"{len(named)} runs, {named[0]} to {named[-1]}"
-    )
-    return f"{channel} of {few}"
+    return f"{channel} of {runs_listed(named, _SHOWN)}" if named else channel

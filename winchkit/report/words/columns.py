@@ -27,10 +27,7 @@ def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 
 
 def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
-    """Rows as by :func:`aligned`, with the last cell of each wrapped in its column.
-
-    Returns: lines of at most 80 characters.
-    """
+    """Rows as by :func:`aligned`, with the last cell of each wrapped in its column."""
     heads = aligned([row[:-1] for row in rows], words)
     width = max((len(head) for head in heads), default=0) + 2
     return [
@@ -51,10 +48,7 @@ def joined(blocks: Iterable[Sequence[str]]) -> str:
 
 
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
-    """Text in lines of at most 80 characters.
-
-    Returns: lines of at most 80 characters.
-    """
+    """Text in lines of at most 80 characters."""
     lines = wrap(
         unbroken(text),
         _WIDTH,

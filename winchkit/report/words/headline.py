@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from winchkit.diagnosis.results import Comparison, OutputError, OutputFit
 from winchkit.quantity_text import quantity, significant
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, error_scale
+from winchkit.report.words.vocabulary import error_scale, output_name
 
 AT_NOISE = 1.15
 """Largest ratio of an error to its noise at which it counts as noise."""
@@ -18,7 +18,7 @@ def comparison_headline(comparison: Comparison) -> str:
     if not outputs:
         return "No output was compared"
     name = worst_outputs(outputs)[0]
-    error, words = outputs[name], OUTPUT_NAMES.get(name, name)
+    error, words = outputs[name], output_name(name)
     if error.noise_rms is None:
         return f"The {words} error is {quantity(error.rms, error.unit)} rms; its noise is unknown"
     if all(at_noise(one) for one in outputs.values()):

@@ -14,10 +14,11 @@ from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, wor
 from winchkit.report.words.steps import cause, reported
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
-    VARIABLE_NAMES,
     clause,
     error_scale,
     listed,
+    output_name,
+    variable_name,
 )
 
 _MOVED = 1.05
@@ -64,7 +65,7 @@ def headline(diagnosis: Diagnosis) -> str:
 def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
     """Headline where known effects explain little, or nothing."""
     if lost := unrelated_outputs(diagnosis):
-        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        names = listed([output_name(name) for name in lost])
         return f"The {names} {'does' if len(lost) == 1 else 'do'} not follow the motion"
     if reported(diagnosis).steps:
         return f"Known effects explain little of the {worst} error"
@@ -90,8 +91,8 @@ def error_text(diagnosis: Diagnosis) -> str:
         name = next(iter(worst_outputs(outputs)), "")
         if not name:
             return ""
-        is_named = OUTPUT_NAMES.get(name, name) in headline(diagnosis)
-        subject = "It" if is_named else f"The {OUTPUT_NAMES.get(name, name)} error"
+        is_named = output_name(name) in headline(diagnosis)
+        subject = "It" if is_named else f"The {output_name(name)} error"
         return f"{subject} is {size_texts(outputs)[name]}."
     first, *others = steps
     either = len(first.effects) > 1 and not first.whole
@@ -165,7 +166,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
     if wrong_channels(diagnosis):
         return "Correct the channel by an import, or confirm that it is right."
     if lost := unrelated_outputs(diagnosis):
-        names = listed([OUTPUT_NAMES.get(name, name) for name in lost])
+        names = listed([output_name(name) for name in lost])
         return (
             f"Check the instrument of the {names}, its wiring and its column in the file: no "
             "effect of the motion explains what differs between repeats."
@@ -195,7 +196,7 @@ def _between(effects: Sequence[str]) -> str:
 
 def where_text(where: Attribution) -> str:
     """Residual attribution: ``tension, 5 periods per drum turn (46 % of its variance)``."""
-    output = OUTPUT_NAMES.get(where.output, where.output)
+    output = output_name(where.output)
     if where.line is not None:
         on = "along" if where.output == "platform_position" else "of line"
         output = f"{output} {on} {where.line}"
@@ -205,7 +206,7 @@ def where_text(where: Attribution) -> str:
     share = f"({percent(where.share)} of its residual variance)"
     if where.variable == "pose":
         return f"{output}, equal on all lines of a pose {share}"
-    variable = VARIABLE_NAMES.get(where.variable, where.variable)
+    variable = variable_name(where.variable)
     if where.order is not None:
         return f"{output}, {often_per_turn(where.variable, where.order)} {share}"
     if where.frequency is not None:
@@ -218,7 +219,7 @@ def often_per_turn(angle: str, order: int) -> str:
     """``5 periods per drum turn``; of a linear axis ``a period of 6.46 mm``."""
     if angle == "position":
         return f"a period of {quantity(2 * pi / order, 'm')}"
-    turn = VARIABLE_NAMES.get(angle, angle).removesuffix(" angle")
+    turn = variable_name(angle).removesuffix(" angle")
     return f"{order} period{'' if order == 1 else 's'} per {turn} turn"
 
 
@@ -270,7 +271,7 @@ def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
 def gain_text(outputs: Mapping[str, OutputFit], opening: str, most: int | None = None) -> str:
     """``With it, the … error falls from … to … (noise …)``; empty where none falls by 5 %."""
     falls = [
-        f"the {OUTPUT_NAMES.get(name, name)} error falls {_change(outputs[name])} "
+        f"the {output_name(name)} error falls {_change(outputs[name])} "
         f"({noise_text(outputs[name])})"
         for name in moved_outputs(outputs)[:most]
     ]
@@ -280,7 +281,7 @@ def gain_text(outputs: Mapping[str, OutputFit], opening: str, most: int | None =
 def worse_text(outputs: Mapping[str, OutputFit]) -> str:
     """Outputs whose held-out error rose; empty where none did."""
     rises = [
-        f"of the {OUTPUT_NAMES.get(name, name)} {_change(output)}"
+        f"of the {output_name(name)} {_change(output)}"
         for name, output in outputs.items()
         if output.heldout_rms_after > _MOVED * output.heldout_rms_before
     ]
@@ -301,7 +302,7 @@ def still_text(outputs: Mapping[str, OutputFit]) -> str:
         if output.noise_rms and output.noise_upper is None
     }
     texts = [
-        f"{OUTPUT_NAMES.get(name, name)} by a factor of {significant(ratio, 2)}"
+        f"{output_name(name)} by a factor of {significant(ratio, 2)}"
         for name, ratio in ratios.items()
         if ratio > _ABOVE
     ]

@@ -11,11 +11,11 @@ from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step
 from winchkit.effects.transition import TRANSITION
 from winchkit.quantity_text import percent, scale_for, significant, with_std
 from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
     clause,
     error_scale,
     kind,
     listed,
+    output_name,
     values_text,
     variable_name,
 )
@@ -119,7 +119,6 @@ def step_text(
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
-    ``without``: held-out errors of the final model without the step, SI. Returns:
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
     """
     parts = [_titled_values(step)]
@@ -128,7 +127,7 @@ def step_text(
         scale = error_scale(output)
         then = scale.text(output.heldout_rms_after)
         before = significant(without[name] / scale.worth)
-        parts.append(f"{OUTPUT_NAMES.get(name, name)} {before} → {then}")
+        parts.append(f"{output_name(name)} {before} → {then}")
     if isfinite(step.share):
         share = percent(step.share) if step.share >= _LEAST else "under 0.1 %"
         parts.append(f"explains {share}")
@@ -210,7 +209,7 @@ def _open_law(step: Step) -> str:
     """``the motor changes the motor torque over the speed by an unknown law``."""
     if not step.place:
         return "the law is unknown"
-    outputs = list(dict.fromkeys(OUTPUT_NAMES.get(p.output, p.output) for p in step.place))
+    outputs = list(dict.fromkeys(output_name(p.output) for p in step.place))
     part, variable = step.place[0].part, step.place[0].variable
     variable = step.curve or (variable and variable_name(variable))
     over = f" over the {variable}" if variable else ""

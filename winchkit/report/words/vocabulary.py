@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from winchkit.diagnosis.results import Combination, Estimate, OutputFit, series_orders
@@ -58,6 +58,11 @@ _MAIN_ORDERS = 0.1
 """Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
 _SYMBOLS = {"axial_stiffness": "EA"}
 _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
+
+
+def output_name(output: str) -> str:
+    """Name of an output in texts."""
+    return OUTPUT_NAMES.get(output, output)
 
 
 def variable_name(variable: str) -> str:
@@ -153,6 +158,13 @@ def interval_text(parameter: str, estimate: Estimate) -> str:
     unit = parameter_unit(parameter, estimate.unit)
     scale = scale_for((estimate.value, estimate.std), unit)
     return f"95 %: {between(*estimate.interval, unit, scale)}"
+
+
+def runs_listed(names: Sequence[str], most: int) -> str:
+    """``a, b``; of more than ``most`` runs ``12 runs, a to l``."""
+    if len(names) <= most:
+        return ", ".join(names)
+    return f"{len(names)} runs, {names[0]} to {names[-1]}"
 
 
 def listed(words: list[str], last: str = "and") -> str:

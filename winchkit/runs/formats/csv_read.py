@@ -100,12 +100,8 @@ _LARGE = 16 << 20
 
 
 def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
-    """Read a run.
+    """Read a run in SI; raises RunError with every fault of the file.
 
-    Returns: channels in SI. Raises RunError with every fault of the file, each with its line.
-
-    Notes
-    -----
     A last line without a line feed is ignored in files of winchkit, whose rows all have one. In a
     file of another program it is a row if it has all columns.
     """
@@ -161,10 +157,7 @@ def _refuse_joined(path: str, block: list[str], number: int) -> None:
 
 
 def read_events(path: str | Path) -> tuple[Note, ...]:
-    """Events of a log of winchkit, which are comments between its rows; raises RunError.
-
-    An event that was cut off or edited is not a JSON object any more, and is left out.
-    """
+    """Events of a log of winchkit, but those that were cut off or edited; raises RunError."""
     events = []
     for line in read_lines(Path(path)):
         if not line.startswith(EVENT_MARK):

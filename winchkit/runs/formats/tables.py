@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from winchkit.errors import Fault, FileError
 from winchkit.extras import library
+from winchkit.regular_file import file_errors
 from winchkit.runs.log import Log
 from winchkit.runs.run import Run
 
 
 def write_mf4(log: Log, path: str | Path) -> None:
-    """Write a log as MDF 4, a group per source with its time stamps, from the first sample of any.
-
-    Raises UsageError without asammdf, FileError where the file cannot be written.
-    """
+    """Write a log as MDF 4, a group per source; raises UsageError without asammdf, FileError."""
     asammdf = library("asammdf", f"{path}: MF4")
     start, _ = log.span
     with asammdf.MDF(version="4.10") as mdf:
@@ -32,23 +29,15 @@ def write_mf4(log: Log, path: str | Path) -> None:
             ]
             mdf.append(signals, acq_name=source.topic, common_timebase=True)
         mdf.header.comment = "\n".join(f"{key}: {value}" for key, value in log.metadata.items())
-        try:
+        with file_errors(path):
             mdf.save(Path(path), overwrite=True)
-        except OSError as error:
-            raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
 
 
 def write_parquet(run: Run, path: str | Path) -> None:
-    """Write a run as Parquet: a column per channel, null for NaN, units in the columns' metadata.
-
-    Raises UsageError without pyarrow, FileError where the file cannot be written.
-    """
+    """Write a run as Parquet, null for NaN; raises UsageError without pyarrow, FileError."""
     library("pyarrow", f"{path}: Parquet")
     from pyarrow import parquet
 
     table = run.to_arrow()
-    try:
-        with Path(path).open("wb") as stream:
-            parquet.write_table(table, stream, compression="zstd")
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
+    with file_errors(path), Path(path).open("wb") as stream:
+        parquet.write_table(table, stream, compression="zstd")

@@ -71,11 +71,7 @@ _COUNTED = re.compile(r"\s*(mV/V|counts?)\s*$")
 
 
 def read_constant(key: str, text: str) -> float:
-    """A constant of :class:`Answers` in SI, ``"2.4 N m"`` or ``"2 mV/V"``.
-
-    ``key``: one of :data:`CONSTANTS`. ``text``: number with unit. Raises UsageError for a wrong
-    unit, or a number that is not above zero.
-    """
+    """A constant of :data:`CONSTANTS` in SI, ``"2.4 N m"``; raises UsageError at zero or below."""
     dimension = CONSTANTS[key]
     option = f"--{key.replace('_', '-')}"
     plain = _COUNTED.sub("", text) if dimension == "ratio" else text
@@ -89,12 +85,7 @@ def read_constant(key: str, text: str) -> float:
 
 
 def as_ours(text: str, dimension: str) -> str:
-    """A quantity as winchkit writes it: ``2,4 Nm`` is ``2.4 N m``.
-
-    Raises UsageError where a comma may separate thousands.
-
-    ``text``: number with unit.
-    """
+    """``2,4 Nm`` as ``2.4 N m``; UsageError where a comma may separate thousands."""
     plain = _with_point(text)
     number = re.match(r"\s*[\d.]+\s*", plain)
     unit = read_unit(plain[number.end() :]) if number else None
@@ -164,11 +155,10 @@ class Answers:
 
 
 def read_answers(given: Mapping[str, Any]) -> Answers:
-    """Answers as a user writes them, in SI.
+    """Answers as a user writes them, in SI; what is empty is not given.
 
-    ``given``: fields of :class:`Answers` and ``columns`` as texts of the command line, and
-    ``options`` that answer a question (``--signed "torque"``); what is empty is not given. Raises
-    UsageError for a text that is wrong, and for a column that is given twice.
+    ``given``: fields of :class:`Answers`, ``columns`` as texts of the command line, and ``options``
+    that answer a question (``--signed "torque"``). Raises UsageError.
     """
     try:
         columns = tuple(read_column(str(text)) for text in given.get("columns") or ())
@@ -194,10 +184,9 @@ def read_answers(given: Mapping[str, Any]) -> Answers:
 def answers_of(table: ColumnTable, tables: Sequence[ColumnTable], answers: Answers) -> Answers:
     """Answers without the columns that are those of other files.
 
-    Returns: a column is that of the files that have its name; where none has, of those that have
-    its number; where none has that either, of all, so that each says so. A column of the axis or
-    the kind is that of the files that have it. An answer with the name of a file is of that file
-    only. Raises UsageError for the name of a file that is none of them.
+    A column is that of the files that have its name; where none has, of those that have its number;
+    where none has that either, of all, so that each says so. Raises UsageError for the name of a
+    file that is none of them.
     """
     for item in answers.columns:
         if item.file and not any(_is_named(t, item.file) for t in tables):
@@ -248,10 +237,8 @@ STORAGE = ("signed", "modulo", "orientation", "axis")
 def with_options(answers: Answers, options: Iterable[str]) -> Answers:
     """Answers with options of the command line that answer a question of :data:`STORAGE`.
 
-    Raises UsageError for another option.
-
-    ``options``: ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
-    ``--orientation vector``, ``--axis "joint"``.
+    ``options``: ``--signed "speed 3"``, ``--modulo "Position=65536"``, ``--orientation vector``,
+    ``--axis "joint"``. Raises UsageError for another option.
     """
     for text in options:
         try:
@@ -270,14 +257,10 @@ def with_options(answers: Answers, options: Iterable[str]) -> Answers:
 
 
 def read_column(text: str) -> ColumnAnswer:
-    """Read ``motor_angle=Pos [deg]``, ``motor_torque=u*35.15`` or ``motor_torque=-u``.
+    """Read ``motor_angle=Pos [deg]``, ``motor_torque=u*35.15`` or ``FILE:motor_torque=-u``.
 
-    Raises UsageError for a text that is none of them.
-
-    ``text``: ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or
-    a variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
-    channel that the file does not have; ``FILE:`` before it for one of several files. Returns: the
-    factor is a multiplier of the unit.
+    The factor is a number or a variable of the file; without a column the file does not have the
+    channel. Raises UsageError for another text.
     """
     found = _COLUMN.fullmatch(text)
     if found is None:

@@ -77,11 +77,10 @@ def choose(
     orientation: str = "",
     motion: str = "",
 ) -> Choice:
-    """Choose the columns of all channels.
+    """Choose the columns of all channels; every column is in ``chosen`` or in ``unused``.
 
     ``given``: channel by the unique name of a column, as the user gave it; empty for an unused one.
-    ``without``: channels that the file does not have, as the user says. ``motion``: as in
-    :class:`Answers`. Returns: every column is in ``chosen`` or in ``unused``.
+    ``without``: channels that the file does not have, as the user says.
     """
     choice = Choice()
     linear = is_linear(table, given, motion)
@@ -275,10 +274,7 @@ def _of_text(column: FileColumn) -> ChannelCandidate:
 
 
 def _is_clock(column: FileColumn, *, steady: bool = False) -> bool:
-    """Whether values increase, apart from a few returns and repeated values, or only decrease.
-
-    A ``steady`` clock increases from row to row in most rows.
-    """
+    """Whether values increase, or only decrease; a ``steady`` clock does so in most rows."""
     steps = np.diff(column.known)
     if not len(steps):
         return False
@@ -343,12 +339,12 @@ def _blocks(table: ColumnTable, clocks: Sequence[ChannelCandidate]) -> list[list
     used = {item.column.number for item in clocks}
     for item in sorted(clocks, key=lambda c: c.column.number):
         before = blocks[-1][-1].column.number if blocks else 0
-        between = [
-            column
+        is_between = any(
+            before < column.number < item.column.number and column.number not in used
             for column in table.columns
-            if before < column.number < item.column.number and column.number not in used
-        ]
-        if blocks and not any(np.any(np.isfinite(column.values)) for column in between):
+            if np.any(np.isfinite(column.values))
+        )
+        if blocks and not is_between:
             blocks[-1].append(item)
         else:
             blocks.append([item])
@@ -356,10 +352,7 @@ def _blocks(table: ColumnTable, clocks: Sequence[ChannelCandidate]) -> list[list
 
 
 def _quality(item: ChannelCandidate) -> tuple[bool, bool, bool, int]:
-    """That of the source first, an absolute one, one with a unit, then the finest.
-
-    All but the finest have distinct stamps that increase.
-    """
+    """That of the source first, an absolute one, one with a unit, then the finest."""
     values = item.column.values
     if item.column.texts is not None:
         stamps = read_stamps(item.column.texts)

@@ -50,14 +50,10 @@ class VelocityRatio:
 
 
 def ratio_of(time: Array, angle: Array, velocity: Array) -> VelocityRatio | None:
-    """Ratio of the change of an angle to the integral of a velocity.
+    """Ratio of the change of an angle to the integral of a velocity, all (n,) in any unit.
 
-    ``time`` (n,): any unit. ``angle``, ``velocity`` (n,): any units; NaN where missing. Returns:
-    None where the two are not proportional (correlation below 0.98) or constant.
-
-    Notes
-    -----
-    With I = ∫ v dt, the ratio is Σ (a − ā)(I − Ī) / Σ (I − Ī)².
+    With I = ∫ v dt, it is Σ (a − ā)(I − Ī) / Σ (I − Ī)². None where the two are not proportional
+    (correlation below 0.98) or constant.
     """
     known = np.isfinite(time) & np.isfinite(angle) & np.isfinite(velocity)
     if np.count_nonzero(known) < 8:
@@ -78,11 +74,7 @@ def ratio_of(time: Array, angle: Array, velocity: Array) -> VelocityRatio | None
 
 
 def likely_counts(estimate: float) -> int | None:
-    """Usual resolution of an encoder that an estimate of counts per turn stands for, or None.
-
-    ``estimate``: counts per turn. Returns: a power of two, or four times a usual number of lines,
-    within 0.5 %; None where there is none or more than one.
-    """
+    """The one usual resolution of an encoder (counts per turn) within 0.5 % of an estimate."""
     near = [n for n in USUAL_COUNTS if abs(estimate / n - 1) < 0.005]
     return near[0] if len(near) == 1 else None
 

@@ -151,10 +151,7 @@ def _whole(item: ColumnAnswer, table: ColumnTable) -> ColumnAnswer:
 
 
 def _wrong_unit(column: FileColumn | None, item: ColumnAnswer) -> Iterator[Question]:
-    """Question for a column whose unit in the file is none of the channel, and nothing else is.
-
-    Beside a factor, the unit of the file may be meant, or the unit that the factor leads to.
-    """
+    """Question for a column whose unit is none of the channel: it, or that of its factor."""
     spelled = None if column is None or item.unit else read_unit(column.unit)
     if column is None or spelled is None:
         return

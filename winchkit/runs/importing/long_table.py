@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.names import words_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole
 
 _MARKERS = frozenset(("marker id", "marker", "tag id", "tag", "aruco id", "fiducial id"))
 """Titles of a column that names the marker whose pose a row has."""
@@ -25,24 +25,20 @@ Rows of one signal change more over several rows than over one: above 1 for a fl
 
 
 def axes_of(table: ColumnTable, by: str) -> dict[str, ColumnTable]:
-    """The table of each axis, of a table in long form.
+    """Tables by axis of a table whose column ``by`` (name or number) names the axis of each row.
 
-    ``table``: each row is of one axis. ``by``: name or number of the column that names the axis.
-    Returns: tables without that column by the name of the axis, in the order of the file; columns
-    keep their names and numbers. Rows without an axis are left out. Raises RunError for a column
-    that is not there, or with too few or too many values.
+    Rows without an axis are left out. Raises RunError for a column that is not there, or with too
+    few or too many values.
     """
     key, rows = _rows_of(table, by, "axis")
     return {name: _of_rows(table, key, own) for name, own in rows.items()}
 
 
 def by_kind(table: ColumnTable, by: str) -> ColumnTable:
-    """A table with columns of their own for each kind of row, and times of their own.
+    """A table with columns and times for each kind of row, which column ``by`` names.
 
-    ``table``: the rows of one kind have other quantities in the same columns than those of another.
-    ``by``: name or number of the column that names the kind. Returns: a column that several kinds
-    have gets the name of its kind before its own; columns without a value are left out. Raises
-    RunError as :func:`axes_of`.
+    A column that several kinds have gets the name of its kind before its own. Raises RunError as
+    :func:`axes_of`.
     """
     key, rows = _rows_of(table, by, "kind")
     columns = [
@@ -54,13 +50,7 @@ def by_kind(table: ColumnTable, by: str) -> ColumnTable:
         if own.texts is not None or np.any(np.isfinite(own.values))
     ]
     note = f"each row is of one kind, by column '{key.source}': {', '.join(rows)}"
-    return replace(
-        table,
-        columns=named_apart(columns),
-        line_of=lambda _row: None,
-        interval=None,
-        notes=(*table.notes, note),
-    )
+    return table.rearranged(columns, note)
 
 
 def has_kinds(table: ColumnTable, key: FileColumn) -> bool:

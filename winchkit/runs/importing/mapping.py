@@ -19,11 +19,7 @@ from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedL
 
 
 def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping:
-    """Mapping of the logs that were imported.
-
-    Returns: files with the same columns are one log; a counter that wraps in one of them does in
-    all.
-    """
+    """Mapping of the logs that were imported; files with the same columns are one log."""
     logs: list[MappedLog] = []
     wraps = {
         (item.source, item.channel): item.stored
@@ -50,10 +46,7 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
 
 
 def mapping_id(mapping: ImportMapping) -> str:
-    """Identifier of a mapping's content, 12 hexadecimal digits.
-
-    Returns: equal for equal columns, units and factors.
-    """
+    """Identifier of columns, units and factors, 12 hexadecimal digits."""
     content = json.dumps([asdict(log) for log in mapping.log], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()[:12]
 
@@ -64,11 +57,9 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
 
 
 def guess_by(whole: ColumnTable, mapping: ImportMapping) -> Guess:
-    """Assignments of a table by a mapping.
+    """Assignments of a table by the log of a mapping whose columns it has; raises RunError.
 
-    ``mapping``: its first log whose columns the file has is used; of logs with the same columns the
-    one with the name of the file. Raises RunError with the columns that the file lacks, where no
-    log fits, and where several logs with the same columns do.
+    Of logs with the same columns it is the one with the name of the file.
     """
     if kinds := [log.kind for log in mapping.log if log.kind and whole.column(log.kind)]:
         whole = by_kind(whole, kinds[0])

@@ -209,10 +209,7 @@ _MATRIX = re.compile(r"^(?:.* )?(?:r|rot|m|matrix|t) ?([123]) ?([1234])$")
 
 @cache
 def words_of(name: str) -> str:
-    """A name in lower case: words, camel case and numbers separated, accents removed.
-
-    Returns: ``MotorPos_ist2`` becomes ``motor pos ist 2``.
-    """
+    """A name in lower case without accents: ``MotorPos_ist2`` becomes ``motor pos ist 2``."""
     text = _CAMEL.sub(" ", "".join(_GREEK.get(char, char) for char in name[:_LONGEST]))
     text = unicodedata.normalize("NFKD", text)
     text = "".join(char for char in text if not unicodedata.combining(char)).lower()
@@ -220,11 +217,7 @@ def words_of(name: str) -> str:
 
 
 def meaning_of(name: str, labels: tuple[str, ...] = ()) -> NamedChannel | None:
-    """Channel that a name stands for; None for an unknown name.
-
-    ``name``: name without unit; the name of a channel of winchkit stands for it. Returns: a column
-    that is not used has the channel :data:`IGNORED`.
-    """
+    """Channel that a name without unit stands for (:data:`IGNORED`: none); None if unknown."""
     # "position" and "force" are words of any recorder, and no names of channels alone.
     is_word = name.rpartition(".")[2] in ROTARY
     if (column_dimension(name) is not None and not is_word) or name == "time":

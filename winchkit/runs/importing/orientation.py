@@ -54,8 +54,6 @@ def rotation_as(stored: str) -> Callable[[Array], Array] | None:
 def settle_orientation(work: Work) -> None:
     """Decide of which convention three numbers of a rotation are, or ask.
 
-    Notes
-    -----
     A pitch beyond ±π/2 is none, and a rotation vector is not longer than π. Else the convention
     counts whose largest step from row to row is five times smaller; small rotations are alike in
     all. Degrees are angles, but in exports of Vicon and of OptiTrack, which have several kinds.
@@ -116,11 +114,7 @@ def _turned(first: Array, second: Array) -> Array:
 
 
 def quaternion_order(first: Array, last: Array) -> str:
-    """Order of a numbered quaternion whose platform turns by less than a right angle, else empty.
-
-    ``first``, ``last`` (n,): first and last element: the real part of such a quaternion is above
-    √½.
-    """
+    """Order of a numbered quaternion by its real part, above √½ below a right angle; else empty."""
     limit = math.sqrt(0.5)
     ends = [np.abs(values[np.isfinite(values)]) for values in (first, last)]
     is_real = [bool(len(end)) and bool(np.all(end > limit)) for end in ends]
@@ -142,10 +136,7 @@ def is_turned_axis(column: FileColumn) -> bool:
 
 
 def body_of(column: FileColumn) -> str:
-    """Body or marker of a tracker that a column belongs to; empty without labels.
-
-    Returns: labels without words such as ``Rigid Body`` and ``Position``.
-    """
+    """Body or marker of a tracker that a column belongs to; empty without labels."""
     labels = [_KIND_OF_BODY.sub("", text) for text in column.labels]
     own = [text for text in labels if not _NOT_A_BODY.match(words_of(text))]
     return " ".join(own) or column.group
@@ -154,9 +145,8 @@ def body_of(column: FileColumn) -> str:
 def chosen_body(
     columns: Sequence[FileColumn], wanted: str | None
 ) -> tuple[str | None, tuple[str, ...]]:
-    """Body whose pose is imported.
+    """Body whose pose is imported, None where none of several is chosen, and all bodies.
 
-    Returns: ``body``: None where there are several and none is chosen. ``bodies``: all of them.
     Where bodies with an orientation exist, single markers are not among them.
     """
     bodies = tuple(dict.fromkeys(body_of(item) for item in columns))
@@ -197,11 +187,7 @@ def vector_names(names: Sequence[str]) -> frozenset[str]:
 
 
 def quaternion_names(names: Sequence[str], order: str = "wxyz") -> dict[str, str]:
-    """Channels of numbered quaternions: ``q0`` to ``q3`` beside positions.
-
-    Returns: channel by name, from ``q0`` to ``q3``; empty where the four names are not there, or no
-    positions.
-    """
+    """Channels of ``q0`` to ``q3`` beside positions by name; else empty."""
     words = {words_of(name).replace(" ", ""): name for name in names}
     axes = all(any(key in words for key in (axis, f"pos{axis}", f"p{axis}")) for axis in "xyz")
     joint = any(key.startswith(("q4", "q5", "dq")) for key in words)

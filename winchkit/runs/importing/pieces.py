@@ -48,9 +48,9 @@ class Jump:
 def jumps_of(streams: Streams) -> tuple[Jump, ...]:
     """Jumps of every motor angle, in the order of time.
 
-    ``streams``: channels in SI. Returns: steps ten times as large as any other, beside a motion as
-    large, which do not return within three samples and which the velocity does not have; and gaps
-    of a counter that wraps in which it may have wrapped.
+    They are steps ten times as large as any other, beside a motion as large, which do not return
+    within three samples and which the velocity does not have; and gaps of a counter that wraps in
+    which it may have wrapped.
     """
     if not streams.has_time:
         return ()
@@ -123,11 +123,7 @@ def _outstanding(rates: Array, steps: Array) -> list[int]:
 
 
 def pieces_of(streams: Streams, jumps: tuple[Jump, ...]) -> tuple[Streams, ...]:
-    """A file in pieces between its jumps; pieces with too few samples are left out.
-
-    ``streams``: channels in SI. ``jumps``: of :func:`jumps_of`. Raises RunError where all pieces
-    have too few samples.
-    """
+    """A file in pieces between its jumps, those with enough samples; RunError without any."""
     if not jumps:
         return (streams,)
     edges = [-np.inf, *((jump.time + jump.until) / 2 for jump in jumps), np.inf]

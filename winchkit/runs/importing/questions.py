@@ -65,11 +65,7 @@ def axis_question(table: ColumnTable, key: FileColumn) -> Question:
 
 
 def ask_units(work: Work) -> None:
-    """Ask the unit or the constant of every column that has none.
-
-    Of columns of several winches that are named alike, and of the axes of a pose, the first one is
-    asked.
-    """
+    """Ask the unit or constant of each column without one; of columns named alike, of the first."""
     unknown = [item for item in work.columns if item.factor is None]
     for number, item in enumerate(unknown):
         if any(is_alike(o, item) for o in unknown[:number]):

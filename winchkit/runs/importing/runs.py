@@ -40,12 +40,7 @@ _DIGITS = 12
 
 
 def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
-    """Read a file of another program by a mapping.
-
-    ``path``: the file, in any format that ``winchkit import`` reads. Returns: channels in SI on one
-    time base. Raises RunError with every fault of the file; FileError with every fault of the
-    mapping.
-    """
+    """Read a file of another program by a mapping; raises RunError, FileError for the mapping."""
     read = mapping if isinstance(mapping, ImportMapping) else read_mapping(mapping)
     guess = guess_by(read_table(path), read)
     streams = streams_of(guess)
@@ -62,10 +57,7 @@ def whole_run(streams: Streams, metadata: Mapping[str, str]) -> Run:
 
 
 def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
-    """Metadata of an imported run: file, format, and what the file says above its header.
-
-    Returns: keys of the file have the prefix ``source``.
-    """
+    """Metadata of an imported run; keys of the file have the prefix ``source``."""
     table = guess.table
     own = {
         key if key in _OWN else f"source {_one_line(key.replace(':', ' '))}": _one_line(value)
@@ -97,12 +89,7 @@ def has_cell(streams: Streams) -> bool:
 def with_angle(streams: Streams) -> Streams:
     """Add the motor angle of a recording that has the motor velocity only.
 
-    ``streams``: channels in SI, without a motor angle.
-
-    Notes
-    -----
-    Trapezoidal rule between the samples that have a velocity; the angle is NaN where the velocity
-    is NaN.
+    Trapezoidal rule between the samples that have a velocity; the angle is NaN where it is NaN.
     """
     if not streams.has_time:
         return streams

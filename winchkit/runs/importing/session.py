@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import number, require_types
-from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
+from winchkit.errors import Fault, FileError, RunError, UsageError, of_each, one_line
 from winchkit.runs.importing.answers import Answers, answers_of, read_answers
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.candidates import is_linear
@@ -258,8 +258,8 @@ def runs_of(
 ) -> Imported:
     """Runs of all files; those without a motor angle are joined to the one that has it.
 
-    ``mapping``: that of the guesses by default. ``masses``: load of each file. Raises UsageError
-    where the file of the angle is not known; RunError with every fault of every file.
+    Raises UsageError where the file of the angle is not known; RunError with every fault of every
+    file.
     """
     parts = [streams_of(guess) for guess in guesses]
     if not any(has_angle(part) for part in parts):
@@ -288,20 +288,13 @@ def _alone(
     guesses: Sequence[Guess], parts: Sequence[Streams], identity: str, loads: Sequence[str | None]
 ) -> Imported:
     """Runs of files of which none is joined to another; all faults of all files at once."""
-    faults: list[Fault] = []
-    runs: list[tuple[int, Run]] = []
-    jumps: list[Fault] = []
-    for index, part in enumerate(parts):
-        try:
-            found, torn = _pieces(part, _metadata([guesses[index]], identity, loads[index]))
-        except RunError as error:
-            faults += error.faults
-            continue
-        runs += [(index, run) for run in found]
-        jumps += torn
-    if faults:
-        raise RunError(faults)
-    return Imported(tuple(runs), (), tuple(jumps))
+
+    def pieces(index: int) -> tuple[list[Run], list[Fault]]:
+        return _pieces(parts[index], _metadata([guesses[index]], identity, loads[index]))
+
+    found = of_each(pieces, range(len(parts)), RunError)
+    runs = tuple((index, run) for index, (own, _) in enumerate(found) for run in own)
+    return Imported(runs, (), tuple(fault for _, torn in found for fault in torn))
 
 
 def _metadata(guesses: Sequence[Guess], identity: str, mass: str | None) -> dict[str, str]:

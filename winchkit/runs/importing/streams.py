@@ -280,11 +280,7 @@ def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Str
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
-    """Without rows that repeat the row before them with its stamp, and rows without values.
-
-    Other values at the stamp of the row before are left out as well where they are few: the moment
-    of either row is not known, and the others are not concerned.
-    """
+    """Without rows that repeat the one before with its stamp, few others at one, and empty rows."""
     table = np.stack([stream.time, *stream.channels.values()], axis=1)
     same = np.zeros(len(table), dtype=bool)
     same[1:] = np.all((table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1])), 1)
@@ -330,12 +326,10 @@ def _is_spread(known: NDArray[np.bool_]) -> bool:
 
 
 def merged(parts: Sequence[Stream]) -> tuple[Array, dict[str, Array], NDArray[np.intp] | None]:
-    """One time base for several streams of one clock.
+    """One time base for several streams of one clock: the samples of the slowest with channels.
 
-    ``parts``: streams with increasing times. Returns: ``time`` (n,): s: the samples of the slowest
-    stream, of those with channels besides temperatures; ``channels``: other streams are
-    interpolated there, and NaN without neighbours; ``rows`` (n,): None where channels of several
-    streams are in a row.
+    Others are interpolated there, and NaN without neighbours. Rows (n,) are None where channels of
+    several streams are in a row.
     """
     if len(parts) == 1:
         return parts[0].time, parts[0].channels, parts[0].rows

@@ -95,6 +95,16 @@ class ColumnTable:
         same = [c for c in self.columns if own and c.unit and own == _letters(c.name + c.unit)]
         return same[0] if len(same) == 1 else None
 
+    def rearranged(self, columns: Sequence[FileColumn], note: str) -> ColumnTable:
+        """The file with other columns, whose rows are no lines of it."""
+        return replace(
+            self,
+            columns=named_apart(columns),
+            line_of=lambda _row: None,
+            interval=None,
+            notes=(*self.notes, note),
+        )
+
 
 def _letters(text: str) -> str:
     """Letters and digits of a name, whatever separates them."""
@@ -109,11 +119,7 @@ def clock_before(clocks: Sequence[FileColumn], column: FileColumn) -> FileColumn
 
 
 def named_apart(columns: Sequence[FileColumn]) -> tuple[FileColumn, ...]:
-    """Columns with numbers and unique names in ``source``.
-
-    ``columns``: in the order of the file. Returns: else with its labels before it, and with ``#2``
-    where these are equal as well.
-    """
+    """Columns with numbers and unique names in ``source``, by their labels or else ``#2``."""
     names = Counter(item.name for item in columns)
     full = [
         item.name if names[item.name] == 1 else " ".join((*item.labels, item.name))

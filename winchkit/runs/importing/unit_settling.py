@@ -278,10 +278,7 @@ def _is_si(table: ColumnTable, name: str) -> bool:
 
 
 def _is_of_ros(table: ColumnTable) -> bool:
-    """Whether a table is of messages of ROS, which are in SI units (REP 103).
-
-    Their topics have slashes, and the torques of its JointState are efforts.
-    """
+    """Whether a table has ROS topics, with slashes; its messages are in SI units (REP 103)."""
     names = [item.name for item in table.columns]
     is_named = any(name.startswith("/") or "effort" in words_of(name).split() for name in names)
     return table.layout == "MCAP" or is_named

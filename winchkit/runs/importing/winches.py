@@ -27,8 +27,6 @@ def choose_channels(
     """Choose one column for each channel of each winch.
 
     What the user says of a column of one winch holds for those of the others that are named alike.
-
-    ``without``: channels that the file does not have, as the user says.
     """
     given = [item for item in choice.chosen if item.channel not in {"time", DATE}]
     # A channel without a winch's name that the user gives: the file is of one winch.
@@ -84,10 +82,7 @@ def choose_channels(
 
 
 def stem_of(column: FileColumn, channel: str) -> tuple[str, ...]:
-    """Words of a column's name, with ``*`` for the name of its winch.
-
-    ``channel``: with the name of its winch, ``1.motor_angle``.
-    """
+    """Words of a column's name, with ``*`` for the name of its winch, as ``channel`` has it."""
     label = channel.rpartition(".")[0]
     words = words_of(" ".join((*column.labels, column.name))).split()
     return tuple("*" if label and word == label else word for word in words)
@@ -120,11 +115,7 @@ def _leave_constant(
     given: Sequence[ChannelCandidate],
     choice: Choice,
 ) -> None:
-    """Leave out constant columns of a motor whose angle or velocity varies.
-
-    A measured angle, velocity or torque of a motor that moves is not constant: such a column is a
-    flag, a set point, or of another joint.
-    """
+    """Leave out constant columns of a motor that moves: a flag, a set point, or another joint."""
     for winch in dict.fromkeys(name.rpartition(".")[0] for name in by_channel):
         names = _MOVING if not {f"{winch}.position", "position"} & set(by_channel) else _LINEAR
         own = [f"{winch}.{base}" if winch else base for base in names]
@@ -161,8 +152,7 @@ def _winch_labels(
 ) -> tuple[str, ...]:
     """Words that distinguish equal columns of several winches: ``1 2 3``, ``a b``; else none.
 
-    The columns of most labels whose names differ in one word only; none where two sets of labels
-    are equally large, as in ``a1 a2 c1 c2``.
+    None where two sets of labels are equally large, as in ``a1 a2 c1 c2``.
     """
     for channel in _SINGLE:
         items = sorted((i for i in others if i.channel == channel), key=lambda i: i.order)

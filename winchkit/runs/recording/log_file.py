@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from winchkit.errors import Fault, FileError, UsageError
-from winchkit.regular_file import regular
+from winchkit.regular_file import file_errors, regular
 from winchkit.runs.recording.rotation import parts_beside
 
 _BUFFER = 1 << 20
@@ -40,24 +40,18 @@ class Lock(Enum):
 
 
 def create(path: Path, *, replace: bool) -> BinaryIO:
-    """Create and lock a file; an earlier one must be empty or is truncated with ``replace``.
-
-    Raises UsageError for a file that is not empty or is being written, FileError where it cannot be
-    written.
-    """
+    """Create and lock a file that is empty or may be replaced; raises UsageError, FileError."""
     place = Path(os.path.realpath(path))
-    try:
+    with file_errors(path):
         return _created(place, path, replace=replace)
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from None
 
 
 def begin_log(path: Path, first: Path, *, replace: bool) -> BinaryIO:
     """Create the first file of the log ``path``: ``path`` itself, or part 1 of a log in parts.
 
     Earlier files of that log are removed with ``replace``, since they would be read as parts of the
-    new one. Raises UsageError, without any change, where one is being written, or where one is not
-    empty and ``replace`` is not given; FileError where a file cannot be removed or written.
+    new one. Raises UsageError, without any change, where one is being written or is to be kept;
+    FileError where a file cannot be removed or written.
     """
     with _folder_locked(path.parent), ExitStack() as held:
         earlier = [item for item in (path, *parts_beside(path)) if os.path.lexists(item)]
@@ -69,7 +63,8 @@ def begin_log(path: Path, first: Path, *, replace: bool) -> BinaryIO:
             held.close()  # an open file cannot be removed there
         for item in earlier:
             if item != first:
-                _remove(item)
+                with file_errors(item, "replaced"):
+                    item.unlink()
         held.close()
         return create(first, replace=replace)
 
@@ -164,13 +159,6 @@ def _require_same(descriptor: int, place: Path, path: Path) -> None:
         raise _being_written(path)
 
 
-def _remove(item: Path) -> None:
-    try:
-        item.unlink()
-    except OSError as error:
-        raise FileError(Fault(f"cannot be replaced: {error.strerror}", str(item))) from None
-
-
 def lock_file(descriptor: int) -> Lock:
     """Lock a file exclusively if it is free; the system releases it with the last descriptor."""
     try:
@@ -193,10 +181,7 @@ def lock_file(descriptor: int) -> Lock:
 
 @contextmanager
 def _folder_locked(folder: Path) -> Iterator[None]:
-    """Lock a folder, where the system can, so that one process at a time starts a log in it.
-
-    Otherwise a log in one file and a log in parts of the same name could start at the same time.
-    """
+    """Lock a folder, where the system can: a log in one file and one in parts may have one name."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except OSError:

@@ -19,11 +19,9 @@ def open_log(
     *,
     replace: bool = False,
 ) -> LogWriter:
-    """Start a log in the format of the file's suffix; its files are locked while they are written.
+    """Start a log in the format of the file's suffix; raises UsageError, FileError.
 
-    ``path``: file, ``.mcap`` or ``.csv``. Raises FileError where the file cannot be written;
-    UsageError for an unknown suffix, an existing log without ``replace``, and a file that is being
-    written.
+    Its files are locked while they are written.
     """
     if path.suffix.lower() == ".mcap":
         from winchkit.runs.recording.channels import ChannelLog

@@ -37,10 +37,7 @@ class RowLog(LogWriter):
             self._events.append(self._event)
 
     def add_event(self, time: float, event: Mapping[str, Any]) -> None:
-        """Keep an event at a moment (s); it is written as soon as the time of the first row is set.
-
-        The last event is repeated at the start of the next part.
-        """
+        """Keep an event (s) until the first row has a time; the last one begins the next part."""
         self._event = time, event
         self._events.append(self._event)
 
@@ -61,10 +58,7 @@ class RowLog(LogWriter):
         self.rows += len(rows)
 
     def close(self, end: Mapping[str, str]) -> None:
-        """Write the rows that wait for a source, and finish the file.
-
-        Where the next part could not be started there is no open file, and nothing is written.
-        """
+        """Write the rows that wait for a source, and finish the file, where one is open."""
         try:
             if self._writer.is_open:
                 self._append(self._aligner.rows(self._newest, ends=True))

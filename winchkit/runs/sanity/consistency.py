@@ -35,13 +35,8 @@ samples."""
 
 
 def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
-    """Findings on ``motor_velocity``.
+    """Findings on ``motor_velocity``; value: the slope, or the squared correlation.
 
-    ``inverted-sign`` and ``wrong-factor`` have the slope as value, ``inconsistent-velocity`` the
-    squared correlation, or a slope that no unit explains.
-
-    Notes
-    -----
     The integral of the velocity over about 40 blocks of time is regressed on the change of the
     angle; blocks with a gap are left out. A velocity is inconsistent where the squared correlation
     is below one half, a constant offset aside, although the changes of the angle and the velocity
@@ -78,10 +73,7 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
 
 
 def _noise(velocity: Array, step: float, rows: float, angle: Array) -> float | None:
-    """Noise of a block's integral and change of the angle; None for a velocity that is all noise.
-
-    A velocity that varies from sample to sample is integrated wrongly by the trapezoidal rule.
-    """
+    """Noise of a block's integral and change of the angle; None for all noise."""
     own = local_noise(velocity)
     if _CLEAR * own > np.nanstd(velocity):
         return None

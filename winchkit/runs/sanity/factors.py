@@ -62,12 +62,10 @@ class Slope:
 
 
 def named_factor(slope: Slope, *, is_angle: bool = False) -> str:
-    """Known constant that the size of a slope is, or whose reciprocal it is.
+    """Known constants that the size of a slope, or its reciprocal, may be; else empty.
 
-    ``slope``: its sign has no influence. ``is_angle``: whether an angle or an angular speed is
-    wrong, which is in no unit of force or length. Returns: the nearest constant within three
-    standard deviations and 5 %, and those that three standard deviations do not exclude either;
-    empty without one.
+    They are the nearest within three standard deviations and 5 %, and those that three standard
+    deviations do not exclude either. An angle (``is_angle``) is in no unit of force or length.
     """
     size = abs(slope.value)
     if size == 0:

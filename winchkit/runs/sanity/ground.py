@@ -43,11 +43,7 @@ _MOVING = 0.02
 
 
 def ground_mask(run: Run) -> NDArray[np.bool_]:
-    """Samples in which something else than the cable carries the load.
-
-    Returns (n,) of bool: all false without a known mass on the cable. The samples from the end of
-    the travel to the motor angle at which the whole load hangs on the cable.
-    """
+    """Samples (n,) in which something else than the cable carries the load; none without a mass."""
     none = np.zeros(len(run), dtype=bool)
     force = next((name for name in _FORCES if name in run), None)
     if force is None or "motor_angle" not in run or not run.load_mass or "load" in run:
@@ -101,10 +97,7 @@ def _edge(position: Array, force: Array) -> float | None:
 
 
 def _without_friction(groups: Sequence[tuple[Array, Array]]) -> Array:
-    """Force of every group: the mean of its medians in both directions.
-
-    Of a group with one direction, half the usual difference of the directions is taken off.
-    """
+    """Mean of each group's medians in both directions, of one less half the usual difference."""
     medians = np.full((3, len(groups)), np.nan)
     for index, (force, rate) in enumerate(groups):
         for row, sign in enumerate((-1.0, 0.0, 1.0)):

@@ -25,12 +25,7 @@ _ROUNDING = 16.0
 
 
 def smallest_differences(values: Array) -> tuple[Array, float]:
-    """Differences of the order in which the signal is smallest, and their noise gain.
-
-    ``values`` (n,): NaN where there is no value. Returns: ``differences`` (m,): of consecutive
-    finite samples; rounding errors of floating point are zero; ``gain``: standard deviation of the
-    differences of white noise of unit variance.
-    """
+    """Differences (m,) of the order in which values (n,) are smallest; their white noise gain."""
     known = values[np.isfinite(values)]
     best, gain, least = np.zeros(0), 1.0, np.inf
     tiny = _ROUNDING * np.finfo(np.float64).eps * (float(np.abs(known).max()) if len(known) else 0)

@@ -39,10 +39,7 @@ _LEAST_BLOCKS = 6
 
 
 def low_pass(run: Run, name: str, step: float) -> Iterator[Finding]:
-    """A cut-off below half the sampling rate, of a channel of resolution ``step``.
-
-    Value: frequency from which the noise falls, Hz.
-    """
+    """A cut-off below half the sampling rate; value: frequency from which the noise falls, Hz."""
     values = run[name]
     if np.mean(np.diff(values) == 0) > _REPEATED:
         return  # the spectrum at high frequencies is that of the few changes

@@ -38,41 +38,31 @@ _MAD = 0.6745
 
 
 def outlier_mask(values: Array) -> NDArray[np.bool_]:
-    """Samples of one channel that are spikes.
+    """Samples of one channel that are spikes, (n,).
 
-    ``values`` (n,): NaN where there is no value. Returns: (n,) of bool.
-
-    Notes
-    -----
     The deviation from the median of two neighbours on each side, less the local slope (the median
     of the eight nearest steps), exceeds twelve local standard deviations (of the deviations, by
     their median over 50 samples), and the neighbours agree within a quarter of it. Where one of the
     two at a distance of two samples deviates as much, it is left out: of two spikes with one sample
-    between them, neither hides the other. The search is repeated without the spikes that were
-    found. A peak that lasts two samples, a step, or an oscillation is none; an oscillation at a
-    quarter or a third of the rate has three or more of them at equal distances. The first and the
-    last sample have neighbours on one side: they are spikes where the step to the next sample
-    exceeds twelve standard deviations and three times the largest other step, and the next four
-    samples agree.
+    between them, neither hides the other. A peak that lasts two samples, a step, or an oscillation
+    is none; an oscillation at a quarter or a third of the rate has three or more of them at equal
+    distances. The first and the last sample have neighbours on one side: they are spikes where the
+    step to the next sample exceeds twelve standard deviations and three times the largest other
+    step, and the next four samples agree.
     """
     spikes, _, ends = _spikes(values, resolution(values))
     return spikes | ends
 
 
 def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
-    """Spikes of every channel of a run that no other channel of the same winch shares.
+    """Masks (n,) of channels with spikes that no other channel of the same winch shares.
 
-    ``resolutions``: resolution of every channel of the model (:func:`~.quantisation.resolutions`).
-    Returns: dict of (n,) array of bool: channels with at least one spike. A peak of the force that
-    lasts one sample, as at a jerk, appears in the angle, the tension, the load or the torque at the
-    same time: it is none. A first or last row of another moment differs in several channels.
-
-    Notes
-    -----
-    Spikes of independent transmission errors coincide too: each with a deviation of another channel
-    as often as that channel deviates. Peaks are physical where the spikes of a channel coincide
-    with more deviations, counted over the other channels, than that (test of a sum of binomial
-    counts, level 1 %).
+    A peak of the force that lasts one sample, as at a jerk, appears in several channels at the same
+    time: it is none. Spikes of independent transmission errors coincide too: each with a deviation
+    of another channel as often as that channel deviates. Peaks are physical where the spikes of a
+    channel coincide with more deviations, counted over the other channels, than that (test of a sum
+    of binomial counts, level 1 %). A first or last row of another moment differs in several
+    channels.
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name], resolutions[name]) for name in names}

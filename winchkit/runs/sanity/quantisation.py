@@ -79,11 +79,7 @@ def quantisation_noise(step: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Step of a quantised channel.
-
-    ``values`` (n,): NaN where there is no value. Returns: in the unit of the values; 0 where no
-    step is found, as for a step far below the noise.
-    """
+    """Step of a quantised channel (n,); 0 where none is found, as for one far below the noise."""
     few = values[:_MOST]
     differences, _ = smallest_differences(few)
     sizes = np.abs(differences)
@@ -150,17 +146,10 @@ def _largest_step(sizes: Array) -> tuple[float, float]:
 
 
 def _cosine_sums(counts: NDArray[np.intp]) -> Array:
-    """Cosine transform of a histogram at its first frequencies, (_SEARCHED,).
+    """Σ counts[n] cos(2πk(n + ½)/_PADDED) at the first frequencies k, (_SEARCHED,).
 
-    Notes
-    -----
-    Coefficient k is Σ counts[n] cos(2πk(n + ½)/_PADDED): a bin is represented by its middle. This
-    is a DCT-II of half as many values, by a real FFT of the same length.
-
-    References
-    ----------
-    Makhoul, J. (1980). A fast cosine transform in one and two dimensions. IEEE Trans. Acoust.
-    Speech Signal Process. 28, 27-34.
+    This is a DCT-II of half as many values, by a real FFT of the same length (Makhoul 1980, IEEE
+    Trans. Acoust. Speech Signal Process. 28, 27-34).
     """
     ordered = np.zeros(_PADDED // 2)
     ordered[: _BINS // 2], ordered[-_BINS // 2 :] = counts[::2], counts[::-2]

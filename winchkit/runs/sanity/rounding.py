@@ -32,11 +32,7 @@ _GRID = 401
 
 
 def mean_error(signal: Array, step: float, noise: float) -> tuple[Array, float]:
-    """Mean rounding error as a function of the signal, whose zero is not known to a step.
-
-    ``signal`` (n,): signal before noise and rounding, apart from an unknown offset. ``step``:
-    resolution, in the unit of the signal.
-    """
+    """Mean rounding error (n,) as a function of the signal, whose zero is not known to a step."""
     size = _sizes(noise / step) * step
     angle = 2 * np.pi / step * np.outer(np.arange(1, _HARMONICS + 1), signal)
     components = np.concatenate([np.cos(angle), np.sin(angle)]) * np.tile(size, 2)[:, None]
@@ -45,10 +41,7 @@ def mean_error(signal: Array, step: float, noise: float) -> tuple[Array, float]:
 
 
 def noise_before_rounding(after: float, step: float) -> float:
-    """Standard deviation σ of the noise before rounding from that of neighbouring samples after it.
-
-    The latter has the variance σ² + q²/12 − (mean square of the mean error).
-    """
+    """σ before rounding, from the variance after it: σ² + q²/12 − (mean square of mean error)."""
     ratio = np.linspace(0.0, _LARGEST, _GRID)
     squares = np.array([r**2 + 1 / 12 - np.sum(_sizes(r) ** 2) / 2 for r in ratio])
     measured = (after / step) ** 2

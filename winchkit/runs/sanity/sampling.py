@@ -48,13 +48,7 @@ def sampling(run: Run) -> Iterator[Finding]:
 
 
 def with_lost_samples(time: Array, values: Array) -> Array:
-    """Values of a channel with NaN at the places where samples were lost.
-
-    Differences of the values are then those of consecutive samples.
-
-    ``time`` (n,): stamps, s, increasing. ``values`` (n,). Returns (m,): one NaN for every gap,
-    whatever its length.
-    """
+    """Values with one NaN for every gap, so that differences are those of consecutive samples."""
     if len(time) < _LEAST_SAMPLES:
         return values
     return np.insert(values, np.flatnonzero(lost_samples(time)) + 1, np.nan)

@@ -47,8 +47,6 @@ two at a slope that ends there, four at the end of a parabola."""
 def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
     """An extreme at which values of resolution ``step`` are cut off; value: share of samples there.
 
-    Notes
-    -----
     Continuous noise has no two equal values: an extreme that repeats is a limit. Values of a coarse
     resolution repeat, but three times as long as elsewhere only at a limit; with a resolution far
     above the noise nothing can be concluded. A channel without noise may rest at its extreme, but

@@ -31,11 +31,7 @@ def address_of(number: int) -> tuple[int, int] | None:
 
 
 def with_addresses(tree: Mapping[str, Any], fault: FaultAt) -> Mapping[str, Any]:
-    """The table ``[modbus]`` with addresses, where its blocks have ``register`` and no ``start``.
-
-    All registers of the table are then numbers of the manual. ``fault`` is called with the key
-    (from ``modbus`` on) and message of each that is none.
-    """
+    """The table ``[modbus]`` with addresses, where its blocks have ``register``, not ``start``."""
     blocks = {key: tree[key] for key in _BLOCKS if isinstance(tree.get(key), Mapping)}
     numbered = [key for key, block in blocks.items() if "register" in block]
     if not numbered:

@@ -101,10 +101,9 @@ class UnitSpec(Table):
 
 @dataclass(frozen=True)
 class StatusBitsSpec(Table):
-    """Bits of a field of one character, and what each number that they make stands for.
+    """Bits of a field of one character; exactly one of ``says``, ``factor``, ``unit`` has items.
 
-    Exactly one of ``says``, ``factor`` and ``unit``, with an item for each number from 0; a frame
-    with a number whose item is empty is invalid.
+    A frame with a number whose item is empty is invalid.
     """
 
     field: str

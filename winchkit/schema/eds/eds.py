@@ -43,11 +43,7 @@ class EdsText:
 
 
 def read_eds_text(path: str | Path) -> EdsText:
-    """Read an EDS, DCF, XDD or XDC file.
-
-    Returns: valid text, and a warning per repair. Raises FileError with every line that cannot be
-    repaired.
-    """
+    """Read an EDS, DCF, XDD or XDC file; FileError with every line that cannot be repaired."""
     return _parsed(str(path), _bytes(Path(path)))
 
 

@@ -188,10 +188,7 @@ def _whole(section: Section) -> bool:
 
 
 def _number(text: str) -> int | None:
-    """A number of CiA 306: decimal, hexadecimal after 0x, octal after 0; None for no number.
-
-    One with a leading zero that has a digit 8 or 9 is decimal.
-    """
+    """A number of CiA 306: decimal (with 8 or 9 also after 0), hexadecimal 0x, octal 0; or None."""
     bare = text.replace(" ", "")
     try:
         if _ZEROS.match(bare):
@@ -332,10 +329,7 @@ def _mend_type(section: Section, findings: EdsFindings) -> int:
 
 
 def _mend_numbers(section: Section, bits: int, signed: bool, findings: EdsFindings) -> None:
-    """Default, value and limits of a whole number, as a number of the object's own type.
-
-    Hexadecimal numbers of signed objects may be the bits of a negative one (CiA 306).
-    """
+    """Default, value and limits of a whole number, as a number of the object's own type."""
     for key in ("DefaultValue", "ParameterValue", "LowLimit", "HighLimit"):
         text = section.values.get(key)
         if not text:
@@ -357,10 +351,7 @@ def _mend_numbers(section: Section, bits: int, signed: bool, findings: EdsFindin
 
 
 def _mend_node_id(section: Section, node: int | None, findings: EdsFindings) -> None:
-    """A value of one node, of an object whose default follows the node's number.
-
-    ``node``: number of [DeviceComissioning]; None where it is not given.
-    """
+    """A value of one node, of an object whose default follows the node's number."""
     default, text = (section.values.get(key, "") for key in ("DefaultValue", "ParameterValue"))
     value = _number(text)
     if "$NODEID" not in default or "$NODEID" in text or value is None:

@@ -39,10 +39,7 @@ ten times itself (rule of thumb)."""
 
 
 def _through(origin: Vector, x_point: Vector, up: Vector) -> FrameSpec:
-    """Frame with its origin in a measured point, z upwards, and x towards a second point.
-
-    Raises UsageError where the second point lies above, below or in the first one.
-    """
+    """Frame with its origin in a point, z upwards, x towards another that is not above it."""
     way = [b - a for a, b in zip(origin, x_point, strict=True)]
     z = [k / hypot(*up) for k in up]
     height = sum(a * k for a, k in zip(way, z, strict=True))

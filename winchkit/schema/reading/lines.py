@@ -1,7 +1,4 @@
-"""Line number of every key of a TOML text, which tomllib does not report.
-
-The text has been parsed by tomllib before, so that its syntax is valid.
-"""
+"""Line number of every key of a TOML text, which tomllib has parsed and does not report."""
 
 from __future__ import annotations
 

@@ -36,10 +36,7 @@ _AXES = ("x", "y", "z")
 
 
 class Inbox:
-    """Messages in their order; a jog that waits is ended by every other message.
-
-    A refresh replaces one that waits.
-    """
+    """Messages in order; every one ends a waiting jog, a refresh replaces a waiting one."""
 
     def __init__(self) -> None:
         self._waiting: deque[Message] = deque()
@@ -139,10 +136,7 @@ class Browser:
                 self._counted = {"rows": log["rows"], "lost": log["drops"]}
 
     def action(self, asked: Message) -> Callable[[], object]:
-        """What a message orders, not carried out yet: every value in it is checked here.
-
-        Raises UsageError. Carrying it out raises what the station raises.
-        """
+        """What a message orders, not carried out yet; UsageError for any wrong value in it."""
         station = self._station
         if station is None:
             raise UsageError("this page only watches; request command first")

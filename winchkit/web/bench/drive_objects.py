@@ -22,10 +22,9 @@ from winchkit.schema.bench import BenchSpec
 
 
 def drive_objects(spec: BenchSpec, status: Mapping[str, Any], winch: str) -> dict[str, Any]:
-    """What ``winchkit info`` shows of a drive, in groups.
+    """What ``winchkit info`` shows of a drive: groups of rows of object, meaning and value.
 
-    Returns: ``groups``: name, and rows of object, meaning and value. Raises UsageError for an
-    unknown winch, and where it is not disabled.
+    Raises UsageError for an unknown winch, and where it is not disabled.
     """
     _require_disabled(spec, status, [winch])
     with drive_at(spec, winch) as node:
@@ -58,20 +57,16 @@ def _groups(node: int, info: DriveInfo) -> list[dict[str, Any]]:
 
 
 def drive_settings(spec: BenchSpec, winch: str) -> list[dict[str, Any]]:
-    """Settings of a winch's drive that can be written, by its EDS; the drive is not asked.
-
-    Returns: ``object``, ``name``, ``type``, ``low`` and ``high`` (None for text).
-    """
+    """Settings of a winch's drive that can be written, by its EDS; the drive is not asked."""
     return [asdict(item) for item in described(declared_drive(spec, winch).dictionary)]
 
 
 def read_setting(
     spec: BenchSpec, status: Mapping[str, Any], winch: str, name: str
 ) -> float | int | str | None:
-    """Value of a setting; None where the drive has no such object.
+    """Value of a setting such as ``6091h:1``; None where the drive has no such object.
 
-    ``name``: object, e.g. ``6081h`` or ``6091h:1``. Raises UsageError for an unknown winch or
-    setting, and where the winch is not disabled.
+    Raises UsageError for an unknown winch or setting, and where the winch is not disabled.
     """
     _require_disabled(spec, status, [winch])
     with drive_at(spec, winch) as node:
@@ -81,12 +76,11 @@ def read_setting(
 def write_setting(
     spec: BenchSpec, status: Mapping[str, Any], winch: str, name: str, text: str
 ) -> dict[str, Any]:
-    """Write a setting of a drive, and read it back; every winch of the bench is disabled.
+    """Write a setting of a drive (whole numbers also as ``0x1F``), and read it back.
 
-    ``name``: object, e.g. ``6081h``. ``text``: value; whole numbers also as ``0x1F``. Returns:
-    ``object``, ``value`` as read back, and ``before``. Raises UsageError for an unknown setting, a
-    value that does not fit it, and where a winch is not disabled; NotPermitted where another
-    program owns the bench, or uses it; DeviceRefused for what the drive does not take.
+    Raises UsageError for an unknown setting, a value that does not fit it, and where a winch is not
+    disabled; NotPermitted where another program owns the bench, or uses it; DeviceRefused for what
+    the drive does not take.
     """
     _require_disabled(spec, status, list(spec.winch))
     dictionary = declared_drive(spec, winch).dictionary

@@ -25,11 +25,7 @@ class FrameWords:
             self._nodes.setdefault(servo.bus, {})[node] = known
 
     def table(self, frames: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
-        """Rows for the newest frame of each identifier, and for the last frames.
-
-        ``frames``: as of a station's ``frames``. Returns: ``newest`` and ``last``: bus, identifier,
-        kind, words, bytes and time (s) of a frame; the newest ones with ``count``, by identifier.
-        """
+        """Rows for the newest frame of each identifier with ``count``, and for the last frames."""
         newest = [
             {"count": count, **self._row(bus, *frame)}
             for bus, found in frames.items()

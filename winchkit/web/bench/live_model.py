@@ -79,22 +79,17 @@ class LiveModel:
         }
 
     def drums(self, status: Mapping[str, Any]) -> dict[str, dict[str, float | None]]:
-        """Turns and winding radius on each drum, and the place of its guide, at a status.
-
-        Returns: by winch: ``turns``, ``radius`` (m) and ``guide`` (travel from an empty drum, m);
-        None for what is not known.
-        """
+        """Turns, winding radius (m) and guide travel from an empty drum (m) by winch, or None."""
         return {
             name: _drum(self.profiles[name], winch.get("cable_length"))
             for name, winch in status.get("winch", {}).items()
         }
 
     def prediction(self, name: str, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-        """Predict the outputs over the history of a winch from its angle and force.
+        """Predict the outputs over the history of a winch, rows of time and :data:`CHANNELS` (SI).
 
-        ``rows``: ``time`` and :data:`CHANNELS`, in SI. Returns: ``time``, and by output
-        ``predicted``, ``residual``, ``mean`` (of the residual over 1 s) and ``noise``: the standard
-        deviation of the readings' white noise. None where the profile cannot be evaluated.
+        By output ``predicted``, ``residual``, ``mean`` (of the residual over 1 s) and ``noise``:
+        the standard deviation of the readings' white noise. None without a usable profile.
         """
         line = self._lines[name]
         if line is None or len(rows) < _FEWEST:

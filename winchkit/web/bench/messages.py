@@ -42,14 +42,14 @@ def change(asked: Message, key: str) -> float:
     return _number(asked, key, "a change of length", "Give metres, for example 0.01.", bool)
 
 
-def speed(asked: Message, key: str = "speed") -> float:
+def speed(asked: Message) -> float:
     """A speed, m/s, above zero; raises UsageError."""
-    return _number(asked, key, "a speed", "Give m/s, for example 0.05.", lambda v: v > 0)
+    return _number(asked, "speed", "a speed", "Give m/s, for example 0.05.", lambda v: v > 0)
 
 
-def signed_speed(asked: Message, key: str = "speed") -> float:
+def signed_speed(asked: Message) -> float:
     """A speed, m/s, not zero; raises UsageError."""
-    return _number(asked, key, "a speed", "Give m/s, for example 0.05.", bool)
+    return _number(asked, "speed", "a speed", "Give m/s, for example 0.05.", bool)
 
 
 def name(

@@ -40,10 +40,7 @@ class Programmes:
         return found
 
     def path(self, name: str) -> Path:
-        """File of a programme.
-
-        ``name``: one of :meth:`paths`; raises UsageError for another.
-        """
+        """File of a programme; raises UsageError for a name that is none of :meth:`paths`."""
         known = self.paths()
         if name not in known:
             raise UsageError(f"there is no programme '{name}'; there are {', '.join(known)}")
@@ -61,12 +58,7 @@ class Programmes:
         return target.name
 
     def preview(self, name: str, here: Mapping[str, float]) -> dict[str, Any]:
-        """Preview of a programme; compares it with the limits.
-
-        ``name``: one of :meth:`paths`. ``here``: present cable length by winch, m, where it is
-        known. Returns: ``name``, ``description``, ``repeats``, ``duration`` of a repeat (s),
-        ``steps`` in words, ``asks``: time and text, ``time`` (s) and ``curves`` by name in m.
-        """
+        """Preview of a programme from the present lengths ``here``; compares it with the limits."""
         declared = load(self.path(name), self._kind).value
         if (by_wing := wings.call("preview", declared)) is not None:
             moved: dict[str, Any] = by_wing(declared, self.spec)

@@ -28,10 +28,7 @@ the length instrument, and the speeds here are those of the drive."""
 
 
 def trip_run(found: Mapping[str, Any], bench: str) -> Run:
-    """The cycles around a trip as a run; its time is 0 in the cycle of the trip.
-
-    ``found``: what :meth:`RemoteStation.trip_history` returns.
-    """
+    """The cycles of a station's ``trip_history`` as a run; the trip is at time 0."""
     channels = {
         f"{winch}.{name}": Channel(values, unit)
         for winch, own in found["winch"].items()

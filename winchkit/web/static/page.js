@@ -51,23 +51,26 @@ export function keep(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
+// Null and false stand for no child.
+const given = (children) => children.flat().filter((child) => child !== null && child !== undefined && child !== false);
+
 // Elements are made from names and texts; no text becomes markup.
 export function el(name, attributes = {}, ...children) {
   const node = document.createElement(name);
   set(node, attributes);
-  node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  node.append(...given(children));
   return node;
 }
 
-// Replaces the children of an element; null and false stand for none.
+// Replaces the children of an element.
 export function fill(node, ...children) {
-  node.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  node.replaceChildren(...given(children));
 }
 
 // As fill, but elements that are there already stay and take what differs: a live picture costs what
 // changed of it, and keeps focus and listeners. For pictures whose listeners do not change.
 export function renew(node, ...children) {
-  matched(node, children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  matched(node, given(children));
 }
 
 function matched(node, wanted) {
@@ -91,7 +94,7 @@ export function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
   // A hundredth of a pixel is not seen, and noise below it changes nothing that is drawn.
   for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, typeof value === "number" ? Math.round(100 * value) / 100 : value);
-  node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  node.append(...given(children));
   return node;
 }
 

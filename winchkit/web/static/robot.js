@@ -239,6 +239,11 @@ function drawPlatform() {
 const SIDES = { Iso: [0.38, 0.32], Top: [0, Math.PI / 2], Front: [0, 0], Side: [Math.PI / 2, 0] };
 const STEPS = ["#9DC1E8", "#6BA0D8", "#3C7DC0", "#1E5C9F", "#0B3A70"];
 
+// The edges of a box by its corners.
+const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+
+const renewed = () => attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); });
+
 function drawPicture() {
   const box = root && root.querySelector("#picture");
   if (!box || !picture) return;
@@ -246,16 +251,16 @@ function drawPicture() {
   const drawn = scene();
   const z = el("input", { type: "range", id: "height", min: bounds()[0][2], max: bounds()[1][2], step: "any", value: shown.z, "aria-label": "Height of the slice", oninput: (event) => { shown.z = Number(event.target.value); height.textContent = `Slice height z = ${number(shown.z, 3)} m`; }, onchange: fetchSlice });
   const height = el("span", {}, `Slice height z = ${number(shown.z, 3)} m`);
-  const limit = (index, name) => el("input", { type: "number", class: "narrow", min: 0, value: shown.limits[index], "aria-label": `${name} cable force, N`, onchange: ({ target }) => { const next = [...shown.limits]; next[index] = target.value === "" ? NaN : Number(target.value); if (!(next[0] >= 0 && next[0] < next[1])) { alarm(target.value === "" ? "The force limit is no number. Type newtons, for example 20." : `The lower force limit, ${number(next[0])} N, is not below the upper one, ${number(next[1])} N, or it is negative.`); target.value = shown.limits[index]; return; } alarm("", "order"); shown.limits = next; attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } });
+  const limit = (index, name) => el("input", { type: "number", class: "narrow", min: 0, value: shown.limits[index], "aria-label": `${name} cable force, N`, onchange: ({ target }) => { const next = [...shown.limits]; next[index] = target.value === "" ? NaN : Number(target.value); if (!(next[0] >= 0 && next[0] < next[1])) { alarm(target.value === "" ? "The force limit is no number. Type newtons, for example 20." : `The lower force limit, ${number(next[0])} N, is not below the upper one, ${number(next[1])} N, or it is negative.`); target.value = shown.limits[index]; return; } alarm("", "order"); shown.limits = next; renewed(); } });
   const margins = slice ? slice.margin.flat().filter((v) => v !== null) : [];
   fill(box, el("header", {}, el("h2", {}, where()),
-    el("span", { class: "row end" }, now ? el("button", { class: "plain", "aria-pressed": String(shown.row === "live"), style: { fontWeight: shown.row === "live" ? 700 : 400 }, onclick: () => attempt(async () => { shown.row = shown.row === "live" ? 0 : "live"; await fetchPicture(); drawPicture(); fetchSlice(); }) }, "Live") : null, Object.keys(SIDES).map((side) => el("button", { class: "plain", "aria-pressed": String(shown.side === side), style: { fontWeight: shown.side === side ? 700 : 400 }, onclick: () => { shown.side = side; drawPicture(); } }, side)), drawingExporter("robot", `${view.name}: ${where()}`, drawn, source, [["cable", view.lines], ["force [N]", picture.tension], ["exit x [m]", view.exit_points.map((p) => p[0])], ["exit y [m]", view.exit_points.map((p) => p[1])], ["exit z [m]", view.exit_points.map((p) => p[2])]]))),
+    el("span", { class: "row end" }, now ? el("button", { class: "plain", "aria-pressed": String(shown.row === "live"), style: { fontWeight: shown.row === "live" ? 700 : 400 }, onclick: () => { shown.row = shown.row === "live" ? 0 : "live"; renewed(); } }, "Live") : null, Object.keys(SIDES).map((side) => el("button", { class: "plain", "aria-pressed": String(shown.side === side), style: { fontWeight: shown.side === side ? 700 : 400 }, onclick: () => { shown.side = side; drawPicture(); } }, side)), drawingExporter("robot", `${view.name}: ${where()}`, drawn, source, [["cable", view.lines], ["force [N]", picture.tension], ["exit x [m]", view.exit_points.map((p) => p[0])], ["exit y [m]", view.exit_points.map((p) => p[1])], ["exit z [m]", view.exit_points.map((p) => p[2])]]))),
     drawn,
     el("div", { class: "under" },
       el("div", {}, el("span", { class: "note" }, "Cable force, N (colour and width)"), el("div", { class: "row" }, limit(0, "Least"), el("span", { class: "scale" }, STEPS.map((c) => el("i", { class: "swatch", style: { background: c } }))), limit(1, "Largest"))),
       el("div", {}, el("span", { class: "note" }, `Feasible at z = ${number(slice ? slice.height : shown.z, 3)} m, ${number(low)} to ${number(high)} N`), el("div", { class: "row" }, el("span", { class: "scale" }, [0.25, 0.5, 0.75, 1].map((o) => el("i", { class: "swatch", style: { background: `color-mix(in srgb, var(--ok) ${o * 50}%, transparent)` } }))), el("span", { class: "note" }, slice ? (margins.length ? `margin 0 to ${number(Math.max(...margins), 3)} N` : "no feasible pose at this height") : "computing"))),
       el("label", {}, el("span", { class: "note" }, height), z),
-      view.poses ? el("label", {}, el("span", { class: "note" }, shown.row === "live" ? `Now; ${view.poses} poses` : shown.row === 0 ? `Home; ${view.poses} poses` : `Pose ${shown.row} of ${view.poses}`), el("input", { type: "range", id: "row", min: 0, max: view.poses, value: shown.row === "live" ? 0 : shown.row, "aria-label": "Pose", onchange: (event) => { shown.row = Number(event.target.value); attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } })) : null));
+      view.poses ? el("label", {}, el("span", { class: "note" }, shown.row === "live" ? `Now; ${view.poses} poses` : shown.row === 0 ? `Home; ${view.poses} poses` : `Pose ${shown.row} of ${view.poses}`), el("input", { type: "range", id: "row", min: 0, max: view.poses, value: shown.row === "live" ? 0 : shown.row, "aria-label": "Pose", onchange: (event) => { shown.row = Number(event.target.value); renewed(); } })) : null));
   if (focus) box.querySelector(`#${focus}`)?.focus();
   history.replaceState(null, "", `${location.pathname}${location.search}#robot/${shown.row}/${number(shown.z).replace("−", "-")}/${shown.side}`);
 }
@@ -275,7 +280,7 @@ function scene() {
   const at = (p) => { const [a, b] = flat(p); return [w / 2 + (a - centre[0]) * scale, h / 2 - (b - centre[1]) * scale]; };
   const path = (points, more) => svg("path", { d: `M${points.map((p) => at(p).map((v) => v.toFixed(1)).join(" ")).join("L")}`, fill: "none", ...more });
   const out = svg("svg", { viewBox: `0 0 ${w} ${h}`, width: "100%", role: "img", "aria-label": `Robot ${view.name}: ${view.lines.map((name, i) => `cable ${name} ${number(picture.tension[i], 3)} N`).join(", ")}`, "font-size": 13 });
-  for (const [a, b] of [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]]) out.append(path([corner(a), corner(b)], { stroke: "var(--line)", "stroke-width": 2 }));
+  for (const [a, b] of EDGES) out.append(path([corner(a), corner(b)], { stroke: "var(--line)", "stroke-width": 2 }));
   const [fmin, fmax] = shown.limits, z = slice ? slice.height : shown.z;
   if (slice) {
     const half = slice.x.length > 1 ? (slice.x[1] - slice.x[0]) / 2 : 0, best = Math.max(1e-9, ...slice.margin.flat().map((v) => v ?? 0));
@@ -287,7 +292,7 @@ function scene() {
     out.append(path([p, picture.anchors[i]], { stroke: force === null ? "var(--muted)" : STEPS[Math.min(4, Math.floor(share * 5))], "stroke-width": force === null ? 1 : 1.2 + 3 * share, ...(force === null ? { "stroke-dasharray": "4 4" } : {}) }));
   });
   const c = picture.corners;
-  for (const [a, b] of [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]]) out.append(path([c[a], c[b]], { stroke: "var(--ink)", "stroke-width": 1.4 }));
+  for (const [a, b] of EDGES) out.append(path([c[a], c[b]], { stroke: "var(--ink)", "stroke-width": 1.4 }));
   const [ox, oy] = at(picture.position);
   out.append(svg("circle", { cx: ox, cy: oy, r: 3.5, fill: "var(--ink)" }));
   const taken = [];

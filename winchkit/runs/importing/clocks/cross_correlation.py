@@ -148,10 +148,7 @@ def correlated(one: TimedSignal, two: TimedSignal) -> Agreement | None:
 def agreement_at(
     peak: Peak, one: TimedSignal, two: TimedSignal, even: Array, step: float
 ) -> Agreement:
-    """Agreement at the lag of the largest correlation; a known lag is refined, with its drift.
-
-    ``even`` are samples of a signal at even steps, of which the standard deviation of the lag is.
-    """
+    """Agreement at a peak; a known lag is refined, with its drift. ``even``: as in ``_lag_std``."""
     interval = max(interval_of(one), interval_of(two))
     known = abs(peak.r) >= _LEAST_CORRELATION and _is_better(peak)
     lag, std = peak.lag, _lag_std(even, step, peak)
@@ -193,10 +190,7 @@ def _even(signal: TimedSignal, step: float, window: float) -> Array:
 
 
 def _normalised(a: Array, b: Array, least: int) -> tuple[Array, Array, Array]:
-    """Pearson's correlation at every lag with enough overlap: means and variances of the overlap.
-
-    At a lag of k samples b[n] is compared with a[n + k].
-    """
+    """Pearson's correlation of b[n] and a[n + k] at every lag k; means, variances of overlap."""
     size = 1 << (len(a) + len(b) - 1).bit_length()
 
     def product(x: Array, y: Array) -> Array:

@@ -1,8 +1,4 @@
-"""Files joined to one run: by the names of points, by time stamps, or by cross-correlation.
-
-Signals that follow each other are a quantity that both files have, or a tension and a torque, a
-cable length and an angle; of a robot's lines and a tracker, those of :mod:`multilateration`.
-"""
+"""Files joined to one run: by the names of points, by time stamps, or by cross-correlation."""
 
 from __future__ import annotations
 
@@ -46,10 +42,9 @@ class Joint:
 
 
 def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams, tuple[Joint, ...]]:
-    """All channels of several files on the clock of the first one.
+    """All channels of several files on the clock of the first one: its time = theirs + ``lag`` (s).
 
-    ``lag``: known difference of the clocks, s: time of the first = time of the others + lag. Raises
-    RunError where the difference of the clocks cannot be determined.
+    Raises RunError where the difference of the clocks cannot be determined.
     """
     first, more = parts[0], list[Stream]()
     notes, joints = list(first.notes), []
@@ -160,10 +155,7 @@ def _require_overlap(first: Streams, other: Streams) -> None:
 
 
 def _doubts(first: Streams, moved: Streams, found: Agreement | None, lag: float) -> str:
-    """Text on a given lag that leaves rows over or that the signals contradict.
-
-    Raises RunError where both are, of more than half of the shorter file.
-    """
+    """Doubts of a given lag; raises RunError where rows are left over and signals contradict it."""
     shorter = min((first, moved), key=lambda part: span_of(part)[1] - span_of(part)[0])
     (start, _), (begin, _) = span_of(first), span_of(moved)
     low, high = max(start, begin), max(start, begin) + _overlap(first, moved)
@@ -224,10 +216,7 @@ _PAIRS = (
 
 
 def agreement_of(first: Streams, second: Streams) -> Agreement | None:
-    """Lag of two files by the channel pair with the largest correlation.
-
-    Returns: None without channels that follow each other.
-    """
+    """Lag of two files by the channel pair with the largest correlation; None without a pair."""
     best = pose_agreement(first, second)
     has_pose = best is not None
     for one, two in _signals(first, second):
@@ -252,10 +241,7 @@ def span_of(streams: Streams) -> tuple[float, float]:
 
 
 def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float = 0.0) -> Streams:
-    """Streams on another clock: t + lag + drift (t − reference).
-
-    ``lag``: s. ``reference``: time at which the lag is valid, s. Returns: the same samples.
-    """
+    """Streams on another clock: t + lag + drift (t − reference), s."""
     moved = tuple(
         replace(item, time=item.time + lag + drift * (item.time - reference))
         for item in streams.streams

@@ -44,10 +44,7 @@ _RIDGE = 1e-9
 
 
 def pose_agreement(first: Streams, second: Streams) -> Agreement | None:
-    """Lag of two files of which one has the motor angles of a robot and the other its positions.
-
-    Returns: None without three lines in one file and a position in the other.
-    """
+    """Lag of the motor angles of a robot and its positions; None without three lines and these."""
     for lines, tracker in ((first, second), (second, first)):
         angles = signals_by_base(lines).get("motor_angle", [])
         found = signals_by_base(tracker)

@@ -21,11 +21,7 @@ _SHOWN = 6
 
 
 def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | None:
-    """The rows of both files whose names both have, in the order of the first one, and a text.
-
-    Returns: None where the two have no names in common. Raises RunError for a name that stands in
-    several rows of a file.
-    """
+    """Rows of both files whose names both have, and a text; None without any; raises RunError."""
     if len(first.streams) != 1 or len(other.streams) != 1:
         return None
     pairs = product(_of_samples(first), _of_samples(other))

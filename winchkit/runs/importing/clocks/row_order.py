@@ -19,12 +19,8 @@ with a wrong stamp."""
 
 
 def rows_in_order(time: Array) -> NDArray[np.bool_]:
-    """Rows without the few single ones whose stamps are out of order.
+    """Mask of rows (n,) without the few single ones whose stamps are out of order.
 
-    ``time`` (n,): stamps in any unit. Returns (n,): all where none or more than a few are.
-
-    Notes
-    -----
     A row is out of order where the times before and after it are one or two intervals apart and it
     is not between them; a clock that is set back shifts all later rows as well.
     """

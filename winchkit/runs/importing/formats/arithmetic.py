@@ -49,9 +49,7 @@ def is_expression(source: str) -> bool:
 def with_derived(table: ColumnTable, sources: Iterable[str]) -> ColumnTable:
     """The table with a further column for every source that is an expression of its columns.
 
-    ``sources``: names, numbers of columns, and expressions; only the last are added. Returns: the
-    unit of a sum is that of its columns, which is the same for all or convertible; a product of
-    columns has none. A name with an operator is that column.
+    A source with an operator that is the name of a column is that column.
     """
     added: list[FileColumn] = []
     for source in dict.fromkeys(sources):

@@ -46,10 +46,7 @@ def is_missing(cell: str) -> bool:
 
 
 def number(cell: str, decimal: str) -> float | None:
-    """Value of a cell; NaN for a missing value, None for another text.
-
-    ``decimal``: ``.`` or ``,``.
-    """
+    """Value of a cell; NaN for a missing value, None for another text."""
     text = _ODD.sub("", cell.strip().strip('"').strip()).replace("−", "-")
     if (_COMMA if decimal == "," else _POINT).fullmatch(text):
         return float(text.replace(",", ".") if decimal == "," else text)
@@ -63,10 +60,7 @@ def number(cell: str, decimal: str) -> float | None:
 
 
 def numbers(cells: Sequence[str], decimal: str) -> tuple[Array, list[int]]:
-    """Values of a column, and the rows that have another text.
-
-    ``decimal``: ``.`` or ``,``. Returns: ``values`` (n,): NaN for a missing value and for a text.
-    """
+    """Values (n,) of a column, NaN for a missing value and a text, and the rows with a text."""
     try:
         plain = [cell.replace(",", ".") for cell in cells] if decimal == "," else cells
         values = np.array(list(map(float, plain)), dtype=np.float64)
@@ -89,18 +83,12 @@ _FEWEST = 5
 
 
 def has_unit(cell: str, decimal: str) -> bool:
-    """Whether a cell is a number with its unit.
-
-    ``decimal``: decimal sign.
-    """
+    """Whether a cell is a number with its unit."""
     return _read_quantity(cell, decimal) is not None
 
 
 def with_cell_units(column: FileColumn) -> FileColumn:
-    """A column of text whose cells have units as one of numbers; another one unchanged.
-
-    Returns: in the most frequent unit of the cells. Cells with another text are in ``wrong``.
-    """
+    """A column of text whose cells have units as one of numbers, in their most frequent unit."""
     if column.texts is None:
         return column
     for decimal in ".,":

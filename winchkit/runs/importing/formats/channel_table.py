@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.names import meaning_of
-from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
+from winchkit.runs.importing.table import ColumnTable, FileColumn
 from winchkit.runs.importing.units.spelling import read_unit, split_unit
 
 _VALUE = re.compile(
@@ -43,11 +43,7 @@ class _Parts:
 
 
 def by_channel(table: ColumnTable) -> ColumnTable:
-    """A table with one column for each channel, where each row is one value of one channel.
-
-    Returns: values and stamps of each channel in a group of its own, in the order of the file; the
-    table itself where it has another form.
-    """
+    """A table with a group of columns per channel, where each row is one value of one channel."""
     parts = _parts(table)
     if parts is None:
         return table
@@ -59,16 +55,9 @@ def by_channel(table: ColumnTable) -> ColumnTable:
         for name in found
         for item in _columns(parts, name, np.flatnonzero(names == name), start)
     ]
-    note = f"each row is one value of one channel, by column '{parts.key.source}': " + ", ".join(
-        found
-    )
-    return replace(
-        table,
-        columns=named_apart(columns),
-        line_of=lambda _row: None,
-        interval=None,
-        notes=(*table.notes, note),
-    )
+    names_found = ", ".join(found)
+    note = f"each row is one value of one channel, by column '{parts.key.source}': {names_found}"
+    return table.rearranged(columns, note)
 
 
 def _common_start(names: Sequence[str]) -> int:
@@ -143,10 +132,7 @@ def _is_constant(column: FileColumn, codes: NDArray[np.intp]) -> bool:
 
 
 def _is_of_any_quantity(value: FileColumn, names: Sequence[str]) -> bool:
-    """Whether the channels, and not the column of the values, have the names of quantities.
-
-    A file without names needs a channel whose name is known.
-    """
+    """Whether the channels, and not the column of the values, have the names of quantities."""
     if _VALUE.fullmatch(value.name):
         return True
     is_unnamed = value.name == str(value.number)

@@ -21,10 +21,7 @@ _OBJECTS = (
 
 
 def read_numpy(path: str, data: bytes) -> ColumnTable:
-    """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code.
-
-    Returns: an array of an NPY file is called ``array``; the fields of a structured one have names.
-    """
+    """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code."""
     try:
         if data.startswith(b"PK"):
             with zipfile.ZipFile(io.BytesIO(data)) as packed:
@@ -49,11 +46,7 @@ def read_numpy(path: str, data: bytes) -> ColumnTable:
 
 
 def read_parquet(path: str, data: bytes) -> ColumnTable:
-    """Read Parquet; units are in the columns' names or metadata (``unit``).
-
-    Returns: a column per column of numbers or dates. Raises UsageError without pyarrow; RunError
-    for an invalid file.
-    """
+    """Read Parquet; raises UsageError without pyarrow, RunError for an invalid file."""
     pa = library("pyarrow", f"{path}: Parquet")
     from pyarrow import parquet
 

@@ -51,10 +51,7 @@ class Dialect:
 
 
 def decode(data: bytes, path: str) -> tuple[list[str], str]:
-    """Lines of a text file and its encoding; raises RunError for a binary file.
-
-    Returns: ``encoding``: empty for UTF-8.
-    """
+    """Lines of a text file and its encoding (empty for UTF-8); RunError for a binary file."""
     for encoding, called in _encodings(data):
         try:
             text = data.decode(encoding)
@@ -80,10 +77,7 @@ def _encodings(data: bytes) -> list[tuple[str, str]]:
 
 
 def whole_lines(lines: list[str]) -> tuple[list[str], list[int] | None]:
-    """Lines joined where a quoted cell has a line end, as spreadsheets write it.
-
-    Returns: ``numbers``: None where no line was joined.
-    """
+    """Lines joined where a quoted cell has a line end, and their numbers; None without such."""
     odd = [n for n, line in enumerate(lines) if line.count('"') % 2]
     # A quotation mark within a cell is one of inches.
     pairs = [
@@ -103,10 +97,7 @@ def whole_lines(lines: list[str]) -> tuple[list[str], list[int] | None]:
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Cells of a line; quoted cells may have delimiters.
-
-    ``delimiter``: one character; a blank stands for any number of blanks.
-    """
+    """Cells of a line; quoted ones may have delimiters, a blank stands for any number of blanks."""
     if '"' not in line:
         return line.split() if delimiter == BLANKS else [c.strip() for c in line.split(delimiter)]
     if delimiter == BLANKS:
@@ -121,8 +112,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 def find_dialect(lines: Sequence[str]) -> Dialect | None:
     """Delimiter and decimal sign that read the most rows of numbers; None without such rows.
 
-    Returns: of equal candidates the one with more cells in a row. Rows with fewer numbers than
-    texts count where no rows have more.
+    Rows with fewer numbers than texts count where no rows have more.
     """
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
     sample = _blocks(filled)
@@ -130,10 +120,7 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
 
 
 def doubt_of_commas(lines: Sequence[str], dialect: Dialect) -> str:
-    """Why quoted numbers of a file with commas between its cells have no certain size.
-
-    Returns: empty where a number shows what its comma is: ``"0,25"`` has decimals.
-    """
+    """Why quoted numbers of a file with commas between its cells have no certain size, or empty."""
     if dialect.delimiter != "," or dialect.decimal != ",":
         return ""
     sample = _blocks([line for line in lines if line.strip()])
@@ -174,10 +161,7 @@ def _is_whole(sample: Sequence[str], dialect: Dialect) -> bool:
 
 
 def _blocks(lines: Sequence[str]) -> list[str]:
-    """Blocks of neighbouring lines: every n-th line may have whole numbers only.
-
-    The first lines are a header, and the last one may be cut off.
-    """
+    """Blocks of neighbouring lines, but the header and the last line, which may be cut off."""
     if len(lines) <= _SAMPLED:
         return list(lines)
     size = _SAMPLED // 3
@@ -188,10 +172,7 @@ def _blocks(lines: Sequence[str]) -> list[str]:
 def _rated(
     split: Sequence[list[str]], delimiter: str, decimal: str, *, is_mixed: bool
 ) -> tuple[float, Dialect] | None:
-    """Cells with a value less cells with a text, in rows of the most frequent width.
-
-    Mixed rows have a stamp and a number at least, and count by these.
-    """
+    """Cells with a value less cells with a text, in rows of the most frequent width."""
     widths: dict[int, int] = {}
     for cells in split:
         values, given = _values(cells, decimal)
@@ -209,10 +190,7 @@ def _rated(
 
 
 def has_cell_units(rows: Sequence[Sequence[str]], decimal: str) -> bool:
-    """Whether at least half of the rows have a cell that is a number with its unit.
-
-    ``decimal``: decimal sign.
-    """
+    """Whether at least half of the rows have a cell that is a number with its unit."""
     return 2 * sum(any(has_unit(c, decimal) for c in cells) for cells in rows) >= max(len(rows), 1)
 
 

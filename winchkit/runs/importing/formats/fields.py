@@ -41,21 +41,14 @@ _DEEPEST = 6
 
 
 def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
-    """Paths and values of the numbers of a message, without its header.
-
-    ``value``: mappings, sequences, objects with ``__slots__``, numbers. Yields: path such as
-    ``pose.x`` or ``joint1.position``; ``data`` for a single number.
-    """
+    """Paths (``pose.x``, ``joint1.position``) and numbers of a message, without its header."""
     for name, item in fields_of(value):
         if not isinstance(item, str) and not _HEADER.match(name):
             yield name, item
 
 
 def stamp_of(value: Any) -> int | None:
-    """Stamp of the header of a message, or of the header of a part of it; None without one.
-
-    ``value``: as for :func:`numbers_of`.
-    """
+    """Stamp of the header of a message, or of the header of a part of it; None without one."""
     header = _field(value, "header")
     for part in () if header is not None else map(str, _keys(value)):
         header = header or _field(_field(value, part), "header")
@@ -84,10 +77,7 @@ def _field(value: Any, name: str) -> Any:
 
 
 def fields_of(value: Any) -> Iterator[tuple[str, float | str]]:
-    """Paths and values of the numbers and texts of a message or a record.
-
-    ``value``: as for :func:`numbers_of`.
-    """
+    """Paths and values of the numbers and texts of a message or a record."""
     yield from _leaves("", value, 0)
 
 
@@ -127,11 +117,10 @@ def _of_mapping(
 
 
 def read_labelled(path: str, data: bytes) -> ColumnTable | None:
-    """Read lines in which every value has its name, as programs write them to a serial line.
+    """Read lines ``t_ms:120,pos_deg:12.3`` or ``t=120 ms, F=60.1 N``; None for another text.
 
-    ``data``: ``t_ms:120,pos_deg:12.3`` or ``t=120 ms, F=60.1 N`` on each line. Returns: None for
-    another text. Raises RunError for a binary file. A line that a message or a lost character
-    interrupts is left out with a note.
+    A line that a message or a lost character interrupts is left out with a note. Raises RunError
+    for a binary file.
     """
     middle = data[len(data) // 2 :][:_LOOKED]
     if middle.count(b":") + middle.count(b"=") < middle.count(b"\n"):

@@ -69,10 +69,7 @@ class Header:
 
 
 def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool) -> Header:
-    """Read what is above the numbers.
-
-    ``decimal``: decimal sign. Returns: names are empty where the file has none.
-    """
+    """Read what is above the numbers; names are empty where the file has none."""
     header = _of_labview(rows, width, decimal) or _of_oscilloscope(rows, width, decimal)
     if header is not None:
         return header
@@ -254,10 +251,7 @@ def _keyed(block: list[list[str]], width: int) -> Header | None:
 
 
 def _titled(block: list[list[str]], width: int) -> Header | None:
-    """Rows whose first cell is their title, above the times: LabVIEW SignalExpress, DIAdem.
-
-    The title stands again above the times of every further channel.
-    """
+    """Rows whose first cell is their title, above the times: LabVIEW SignalExpress, DIAdem."""
     titles = [cells[0].strip().casefold() if cells else "" for cells in block]
     row = next((n for n, title in enumerate(titles) if title in _NAME_ROW), None)
     if row is None:

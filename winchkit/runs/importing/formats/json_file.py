@@ -33,11 +33,7 @@ def is_json(data: bytes) -> bool:
 
 
 def read_json(path: str, data: bytes) -> ColumnTable | None:
-    """Read JSON, or JSON Lines (a value on every line).
-
-    Returns: None for a text that is no JSON. Raises RunError for JSON without a list of numbers,
-    and for a file that ends within a value.
-    """
+    """Read JSON or JSON Lines; None for no JSON, RunError for a list that is missing or cut off."""
     value, notes = _loaded(path, data)
     if value is None:
         return None

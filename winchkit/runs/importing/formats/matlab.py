@@ -34,10 +34,7 @@ _CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat',
 
 
 def read_mat(path: str, data: bytes) -> ColumnTable:
-    """Read a MAT file of version 4 to 7.
-
-    Raises RunError for an invalid file.
-    """
+    """Read a MAT file of version 4 to 7; raises RunError for an invalid file."""
     from scipy.io import loadmat, whosmat
 
     stream: Any = io.BytesIO(data)
@@ -106,8 +103,7 @@ def _refuse_objects(path: str, arrays: dict[str, Any], notes: list[str]) -> None
 def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any, str]]:
     """Arrays of a variable by their path, with the unit where a field beside them has it.
 
-    An array of structures has its index in the path; a structure with the name and the values of a
-    signal (Simulink's scopes, dSPACE) has that name.
+    A structure with the name and the values of a signal (Simulink's scopes, dSPACE) has that name.
     """
     if depth >= _DEEPEST:
         return
@@ -129,10 +125,9 @@ def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any, str]]:
 
 
 def read_hdf5(path: str, data: bytes) -> ColumnTable:
-    """Read an HDF5 file, or a MAT file of version 7.3.
+    """Read the datasets of an HDF5 file, or a MAT file of version 7.3, not through links to others.
 
-    Returns: every dataset of numbers by its path; attributes ``unit`` or ``units`` are units. Links
-    to other files are not followed. Raises UsageError without h5py; RunError for an invalid file.
+    Raises UsageError without h5py; RunError for an invalid file.
     """
     h5py = library("h5py", f"{path}: HDF5 or MAT 7.3")
     arrays: dict[str, Any] = {}
@@ -142,9 +137,8 @@ def read_hdf5(path: str, data: bytes) -> ColumnTable:
         sets: dict[str, Any] = {}
 
         def visit(name: str, item: Any) -> None:
-            is_internal = name.startswith("#")
-            is_elsewhere = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
-            if isinstance(item, h5py.Dataset) and not is_internal and not is_elsewhere:
+            is_set = isinstance(item, h5py.Dataset)
+            if is_set and not name.startswith("#") and not (item.external or item.is_virtual):
                 sets[name.replace("/", ".")] = item
 
         source.visititems(visit)
@@ -184,8 +178,7 @@ def _own(group: Any) -> dict[str, Any]:
 def _of_matlab(item: Any, left: list[int], depth: int) -> Any:
     """Value of a variable of MAT 7.3: structures as mappings, arrays of them and cells as lists.
 
-    Cells and the fields of an array of structures are references to the elements. ``left``: number
-    of elements that may still be read, since references may repeat each other without end.
+    ``left``: elements that may still be read, since references may repeat each other without end.
     """
     left[0] -= 1
     if item.attrs.get("MATLAB_empty", 0) or depth > _DEEPEST or left[0] < 0:

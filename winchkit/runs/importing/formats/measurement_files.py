@@ -31,11 +31,9 @@ _TIMES = "mM"
 
 
 def read_mdf(path: str, data: bytes) -> ColumnTable:
-    """Read an MDF file of version 3 or 4, in physical units.
+    """Read an MDF file of version 3 or 4, in physical units; invalid samples are NaN.
 
-    Returns: a column per channel of numbers; channels of one channel group have one time. Samples
-    that the file marks as invalid are NaN. Lines ``key: value`` of its comment are metadata. Raises
-    UsageError without asammdf; RunError for an invalid file, or one without channels of numbers.
+    Lines ``key: value`` of its comment are metadata. Raises UsageError without asammdf; RunError.
     """
     asammdf = library("asammdf", f"{path}: MDF")
     notes: list[str] = []
@@ -102,9 +100,8 @@ def _channels(file: Any, notes: list[str]) -> Iterator[FileColumn]:
 def read_tdms(path: str, data: bytes) -> ColumnTable:
     """Read a TDMS file of LabVIEW, with scaled values.
 
-    Returns: a column per channel of numbers or time stamps. Channels that are waveforms have the
-    time of their increment; those of one group with one time are sampled together. Raises
-    UsageError without npTDMS; RunError for an invalid file, or one without channels of numbers.
+    Channels that are waveforms have the time of their increment; those of one group with one time
+    are sampled together. Raises UsageError without npTDMS; RunError.
     """
     nptdms = library("nptdms", f"{path}: TDMS")
     notes: list[str] = []

@@ -1,7 +1,6 @@
 """Reader of MCAP files of other programs: messages in JSON, and of ROS 2 (extra ``ros2``).
 
-Every topic is a group of columns with its own times, of its recorder and of its source; fields are
-named by their path, elements of arrays by their index, joints of a JointState by their name.
+Every topic is a group of columns with its own times, of its recorder and of its source.
 """
 
 from __future__ import annotations
@@ -31,11 +30,10 @@ class _Message:
 
 
 def read_messages(path: str, data: bytes) -> ColumnTable:
-    """Read an MCAP file.
+    """Read an MCAP file: columns by topic, with log time and header's stamp in ns.
 
-    Returns: columns by topic, in the order of the file, with the log time and the stamp of the
-    header, in ns since 1970 or on a clock of their own. Raises UsageError for ROS 2 messages
-    without the decoder; RunError for an invalid file, and one without numbers in a known encoding.
+    Raises UsageError for ROS 2 messages without the decoder; RunError for an invalid file, and one
+    without numbers in a known encoding.
     """
     from mcap.reader import NonSeekingReader
 

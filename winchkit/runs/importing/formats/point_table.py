@@ -58,10 +58,7 @@ def _is_text(column: FileColumn) -> bool:
 
 
 def names_of_points(table: ColumnTable, used: Collection[str]) -> tuple[Sequence[str], ...]:
-    """Columns that may be the names of points: texts, or numbers below such a title.
-
-    ``used``: columns of channels.
-    """
+    """Unused columns that may be the names of points: texts, or numbers below such a title."""
     found = []
     for column in table.columns:
         titled = words_of(column.name) in _TITLES

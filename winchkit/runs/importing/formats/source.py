@@ -19,12 +19,10 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_table(path: str | Path) -> ColumnTable:
-    """Read a file.
+    """Read a file of any format, columns in its units.
 
-    ``path``: text, JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS. Returns: columns in
-    the units of the file. Raises RunError for a file that cannot be read, an unknown format, and
-    one without numbers; UsageError without the library of the format, with the name of the extra
-    that installs it.
+    Raises RunError for a file that cannot be read, an unknown format, and one without numbers;
+    UsageError without the library of the format.
     """
     table = _read(path)
     units = replace(table, columns=tuple(with_cell_units(item) for item in table.columns))

@@ -17,11 +17,7 @@ from winchkit.runs.importing.table import ColumnTable, named_apart, readable, re
 
 
 def read_workbook(path: str, data: bytes) -> ColumnTable:
-    """Read a workbook.
-
-    Returns: cached values of formulas; dates as text in ISO 8601. Raises UsageError without
-    openpyxl; RunError for an invalid workbook, and one without rows of numbers.
-    """
+    """Read a workbook; raises UsageError without openpyxl, RunError without rows of numbers."""
     openpyxl = library("openpyxl", f"{path}: XLSX")
     with readable(path, "workbook"):
         with zipfile.ZipFile(io.BytesIO(data)) as packed:

@@ -55,9 +55,8 @@ def is_stamp(cell: str) -> bool:
 def read_stamps(cells: Sequence[str]) -> Stamps:
     """Read a column of stamps.
 
-    Returns: days of the form 3/4/2026 are day/month where any first number exceeds 12, else
-    month/day; 3.4.2026 is day.month. Times of day that go back by more than 12 h start the next
-    day.
+    Days 3/4/2026 are day/month where any first number exceeds 12, else month/day; 3.4.2026 is
+    day.month. Times of day that go back by more than 12 h start the next day.
     """
     found = [_match(cell) for cell in cells]
     day_first = any(int(m["first"]) > 12 for m in found if m and _group(m, "first"))
@@ -82,11 +81,10 @@ def read_stamps(cells: Sequence[str]) -> Stamps:
 
 
 def epoch_unit(values: Array) -> str | None:
-    """Unit in which a column counts from 1970 (``s``, ``ms``, ``us``, ``ns``, ``excel``), or None.
+    """Unit in which a column (n,) counts from 1970: ``s``, ``ms``, ``us``, ``ns`` or ``excel``.
 
-    ``values`` (n,). Returns: None for a clock that starts at another moment. Days of a spreadsheet
-    (30000 to 60000, years 1982 to 2064) are recognised where the numbers have fractions finer than
-    0.1 s.
+    Days of a spreadsheet (30000 to 60000, years 1982 to 2064) are recognised where the numbers have
+    fractions finer than 0.1 s.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):

@@ -51,10 +51,7 @@ _TEXT_SHARE = 0.2
 
 
 def read_text_table(path: str, data: bytes) -> ColumnTable:
-    """Read a text file.
-
-    Raises RunError for a binary file, and for one without rows of numbers.
-    """
+    """Read a text file; raises RunError for a binary file, and for one without rows of numbers."""
     lines, encoding = decode(data, path)
     lines, numbers = whole_lines(lines)
     dialect = find_dialect(lines[_end_of_header(lines) :])
@@ -82,10 +79,7 @@ def _end_of_header(lines: Sequence[str]) -> int:
 
 
 class _SplitLines(Sequence[Row]):
-    """Lines with their number, split when they are read: the cells of a long file are not kept.
-
-    ``least``: line below which rows have at least a number of cells.
-    """
+    """Lines with their number, split when they are read: the cells of a long file are not kept."""
 
     def __init__(
         self,
@@ -186,10 +180,7 @@ class _Rows:
 def table_of_rows(
     path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended: bool
 ) -> ColumnTable:
-    """Table of split lines.
-
-    ``dialect``: decimal sign and width.
-    """
+    """Table of split lines."""
     head = [rows[n] for n in range(min(len(rows), _HEAD))]
     is_padded = bool(keyed := keyed_width(head))
     if is_padded:
@@ -229,10 +220,7 @@ def _counts_columns(cells: Sequence[str]) -> bool:
 
 
 def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
-    """Whether a row has the width of the rows of numbers, and mostly values.
-
-    Further words behind them are a remark where blanks separate the cells.
-    """
+    """Whether a row has the width of the rows of numbers, or a remark behind, and mostly values."""
     behind = len(cells) - dialect.width
     if behind and not (dialect.delimiter == BLANKS and 0 < behind <= _remark(cells, dialect)):
         return False
@@ -324,8 +312,7 @@ def _not_data(
 def _cut_off(cells: Sequence[str], rows: Sequence[Row], dialect: Dialect) -> str:
     """Note on a last row without a line end whose last number may lack digits; empty for none.
 
-    It lacks some for certain where the rows before it have more decimals, all as many; whole
-    numbers and numbers of any length say nothing.
+    It lacks some for certain where the rows before it have more decimals, all as many.
     """
     before = [row[-1] for _, row in rows[-_COMPARED - 1 : -1] if len(row) == len(cells)]
     many = [len(text.partition(dialect.decimal)[2]) for text in (*before, cells[-1])]

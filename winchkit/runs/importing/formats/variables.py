@@ -27,8 +27,7 @@ def table_of_arrays(
 ) -> ColumnTable:
     """Table of arrays: vectors and columns of matrices, scalars as constants, texts as metadata.
 
-    ``arrays``: variables; matrices have a row or a column per sample, the longer side is time.
-    Raises RunError without any array of numbers.
+    The longer side of a matrix is time. Raises RunError without any array of numbers.
     """
     columns: list[FileColumn] = []
     constants: dict[str, float] = {}
@@ -67,11 +66,7 @@ def table_of_arrays(
 
 
 def column_of(name: str, array: Any, unit: str) -> FileColumn:
-    """Column of a vector of numbers, or of dates as nanoseconds since 1970.
-
-    ``array`` (n,): numbers, dates or durations (``datetime64``, ``timedelta64``). ``unit``: empty
-    where the name may have it, ``Load [N]``.
-    """
+    """Column of a vector (n,) of numbers, or of dates and durations in ns."""
     if array.dtype.kind in "mM":
         missing = np.isnat(array)
         whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)

@@ -42,10 +42,9 @@ class Wrap:
 
 
 def restored(values: Array, stored: str) -> Array:
-    """Numbers with their sign and without wraps.
+    """Numbers (n,) with their sign and without wraps.
 
-    ``values`` (n,): NaN where missing. ``stored``: ``modulo 360``, ``two's complement 65536``,
-    ``sign and magnitude 2048``; empty for numbers that are stored as they are.
+    ``stored``: ``modulo 360``, ``two's complement 65536``, ``sign and magnitude 2048``, or empty.
     """
     if stored in {"", VECTOR, EULER}:
         return values
@@ -79,18 +78,12 @@ def _unwrapped(values: Array, modulus: float) -> Array:
 
 
 def wrap_of(values: Array, usual: Collection[float], rare: Collection[float] = ()) -> Wrap | None:
-    """Modulus of numbers that wrap, by their steps.
+    """Modulus of numbers (n,) that wrap, by their steps; an estimate if neither usual nor rare.
 
-    ``values`` (n,): NaN where missing. ``usual``: moduli of which one step is enough: a turn in the
-    unit of the column, ranges of counters. Returns: None where no steps are near a modulus. The
-    modulus is an estimate where it is neither usual nor rare.
-
-    Notes
-    -----
-    A step beyond half of the range of the numbers is a wrap of modulus M where the motion
-    continues over it: step ± M differs from the steps before and after it by no more than twice
-    the largest change from one other step to the next, which is below M/4. No numbers are more
-    than M apart.
+    One step is enough for a ``usual`` one: a turn in the unit of the column, a counter's range. A
+    step beyond half of the range of the numbers is a wrap of modulus M where the motion continues
+    over it: step ± M differs from the steps before and after it by no more than twice the largest
+    change from one other step to the next, which is below M/4. No numbers are more than M apart.
     """
     own = values[np.isfinite(values)]
     if len(own) < _FEWEST:

@@ -58,10 +58,7 @@ def settle_stored(work: Work) -> None:
 
 
 def _in_order(work: Work, item: ChosenColumn, *, is_whole: bool = True) -> Array:
-    """Values of a column without those of single rows whose time is out of order.
-
-    Not ``is_whole``: those of the longest stretch without a gap, over which a step says nothing.
-    """
+    """Values of a column in the order of time, or of the longest stretch without a gap."""
     clock = clock_of(work, item)
     times = np.zeros(0) if clock is None else clock_values(clock)
     values = item.column.values

@@ -52,10 +52,9 @@ class LostSign:
 
 
 def lost_sign(values: Array, *, is_small: bool = False) -> LostSign | None:
-    """How a column is stored whose sign seems to be lost; None for another one.
+    """How a column (n,) is stored whose sign seems to be lost; None for another one.
 
-    ``values`` (n,): NaN where missing. ``is_small``: whether the numbers are small for certain, as
-    per cent of a rated torque are, so that all may be negative.
+    ``is_small``: for certain, as per cent of a rated torque are, so that all may be negative.
     """
     known = np.unique(values[np.isfinite(values)])
     if len(known) < 2 or known[0] < 0:
@@ -69,10 +68,7 @@ def lost_sign(values: Array, *, is_small: bool = False) -> LostSign | None:
 
 
 def sign_by_jumps(values: Array) -> LostSign | None:
-    """The same of a signal that fills the range of its field, by its jumps from end to end.
-
-    ``values`` (n,): in the order of time, NaN where missing.
-    """
+    """The same of a signal that fills the range of its field, by its jumps from end to end."""
     known = values[np.isfinite(values)]
     if not len(known) or np.min(known) < 0:
         return None

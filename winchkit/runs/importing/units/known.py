@@ -257,10 +257,7 @@ _FOLDED = _folded()
 
 
 def known_unit(text: str) -> SpelledUnit | None:
-    """The unit of a spelling; None for another text.
-
-    Returns: the case counts where two units differ by it only (``mN m``, ``MN m``).
-    """
+    """The unit of a spelling; the case counts where two differ by it only (``mN m``, ``MN m``)."""
     for spelling in dict.fromkeys((_rate(text), text)):
         key = _key(spelling)
         if key in _KNOWN:

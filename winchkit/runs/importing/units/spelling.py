@@ -1,8 +1,4 @@
-"""Units as other programs spell them: ``1/min``, ``U/min``, ``°``, ``Nm``, ``Inkr``, ``mV/V``.
-
-A spelling has a dimension and the SI value of one unit. Units without an SI value of their own have
-dimensions of this module: counts of an encoder, a share of the rated torque, a bridge's mV/V.
-"""
+"""Units in the cells of a header: alone, behind a name, or in brackets."""
 
 from __future__ import annotations
 
@@ -28,11 +24,7 @@ _SCALED = re.compile(
 
 @lru_cache(4096)
 def read_unit(text: str) -> SpelledUnit | None:
-    """The unit of a spelling, with or without brackets; None for another text.
-
-    ``text``: spelling, e.g. ``1/min`` or ``(Nm)``. Returns: the case counts where two units differ
-    by it only (``mN``, ``MN``).
-    """
+    """The unit of a spelling, with or without brackets; None for another text."""
     if len(text) > _LONGEST:
         return None
     inner = _inner(text)
@@ -45,10 +37,7 @@ def read_unit(text: str) -> SpelledUnit | None:
 
 
 def is_multiple(text: str) -> bool:
-    """Whether a text is a unit with a number, which may be the size of 1, a range or a resolution.
-
-    ``text``: ``0.1 rpm``, ``x10 rpm``, ``500 N``; not ``1/min``.
-    """
+    """Whether a text is a unit with a number (``0.1 rpm``): the size of 1, or a range."""
     found = _SCALED.fullmatch(_inner(text))
     is_unit = found is not None and read_unit(found["unit"] or found["unit2"]) is not None
     return is_unit and read_unit(text) is None
@@ -62,11 +51,9 @@ def _inner(text: str) -> str:
 
 
 def split_unit(text: str) -> tuple[str, str]:
-    """Name and unit of a header cell.
+    """Name and unit of ``Torque (Nm)``, ``speed/rpm``, ``pos_deg``, ``Kraft in N`` or ``t, s``.
 
-    ``text``: ``Torque (Nm)``, ``speed/rpm``, ``pos_deg``, ``Kraft in N``, ``time [s]``, ``t, s``.
-    Returns: the unit is empty where the cell has none that is known; a unit in brackets is one also
-    where it is not known.
+    The unit is empty where the cell has none that is known; one in brackets need not be known.
     """
     bracketed = _in_brackets(text)
     if bracketed is not None:
@@ -157,10 +144,7 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
 
 
 def unit_as_name(name: str) -> SpelledUnit | None:
-    """The unit that is all of a name: ``ms``, ``rpm``; None for words that are more than units.
-
-    A low line stands for a slash (``rad_s``): ``t_r`` is a name with an index.
-    """
+    """The unit that is all of a name: ``ms``, ``rad_s``; ``t_r`` is a name with an index."""
     word = name.strip().replace("_", "/")
     if len(word) < 2 or word.casefold() in {*_SHORT_WORDS, *_PLAIN_WORDS, "min"}:
         return None
@@ -168,11 +152,7 @@ def unit_as_name(name: str) -> SpelledUnit | None:
 
 
 def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
-    """The unit that one word of a name is: ``rpm``, ``speed_rpm_left``, ``Nm 2``.
-
-    ``name``: name of a column without a unit at its end or in brackets. Returns: None without such
-    a word, and for several.
-    """
+    """The one unit that is a word of a name without a unit at its end: ``speed_rpm_left``."""
     found = set()
     for word in re.split(r"[^A-Za-z°]+", name[:_LONGEST]):
         unit = read_unit(word)
@@ -183,10 +163,7 @@ def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
 
 
 def is_unit_row(cells: list[str]) -> bool:
-    """Whether a row below or above the names has the units of the columns.
-
-    Returns: at least half of the cells with text are units, and one of them is.
-    """
+    """Whether at least half of the cells with text of a row are units."""
     given = [cell.strip() for cell in cells if cell.strip()]
     units = [cell for cell in given if read_unit(cell)]
     neutral = [cell for cell in given if cell.lower().strip("[](){}") in _NO_UNIT]
