@@ -112,7 +112,7 @@ function drawGrid(own, p) {
   drawn.addEventListener("keydown", (event) => move(event, p));
   const cells = own.winches.flatMap((winch) => winch.times.map((t, s) => [winch.winch, day(t), winch.values[s], winch.stds[s], winch.deviations[s]]));
   const columns = ["winch", "date", `value [${own.unit}]`, `std [${own.unit}]`, "deviation [σ]"].map((head, i) => [head, cells.map((cell) => cell[i])]);
-  return el("div", { class: "effect" }, el("header", { class: "row" }, el("h2", {}, title(own)), el("span", { class: "note" }, `common ${withStd(own.common, own.common_std)} ${own.unit}; between winches ${number(own.between_std, 2)}, between sessions ${number(own.session_std, 2)} ${own.unit}`),
+  return el("div", { class: "effect" }, el("header", { class: "row" }, el("h2", {}, title(own)), el("span", { class: "note" }, `common ${withStd(own.common, own.common_std)} ${own.unit}; between winches ${number(own.between_std, 2)} ${own.unit}, between sessions ${number(own.session_std, 2)} ${own.unit}`),
     drawingExporter(`fleet-${own.effect}`, `${title(own)}: deviation from the median winch`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), columns)), drawn);
 }
 
