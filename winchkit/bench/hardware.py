@@ -83,10 +83,7 @@ class Wired:
         return () if pid is None else (pid,)
 
     def disarm(self) -> None:
-        """Switch off the host watchdog of the drives that are at rest.
-
-        Any other keeps its watchdog, which stops it.
-        """
+        """Switch off the host watchdog of drives at rest; that of any other stops it."""
         for name, axis in self.axes.items():
             if self.loop.winches[name].controller.phase is Phase.DISABLED:
                 with suppress(ConnectionLost):
@@ -103,11 +100,7 @@ def wire(
     separate: bool = False,
     tell: Tell = to_stderr,
 ) -> Wired:
-    """Open all buses and lines; ``stack`` closes them. ``tell`` takes lines on a long set-up.
-
-    ``separate`` has the lines that are not CAN served by a process of their own, where the clock is
-    the machine's.
-    """
+    """Open all buses and lines; ``separate``: a process of its own for those that are not CAN."""
     from winchkit.effects import load_catalogue, terms_of
     from winchkit.estimation.cable_state import CableEstimator
 

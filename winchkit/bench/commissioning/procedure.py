@@ -70,11 +70,7 @@ _LIMITS = (
 
 
 def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> CommissioningRecord:
-    """Lead through every item and write the record beside the bench file; returns it.
-
-    Raises NotPermitted for what was not confirmed or did not stop, MotionError where a stop came
-    meanwhile, and every error of opening.
-    """
+    """Lead through every item and write the record; raises NotPermitted for an unconfirmed one."""
     with unless_stopped(spec, "commissioned: nothing was recorded; begin anew") as check:
         return _commission(spec, StoppedDialogue(dialogue, check), clock)
 

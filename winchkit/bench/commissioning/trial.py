@@ -80,10 +80,7 @@ class Trials:
     """A bench that is wired for trials; a context manager."""
 
     def __init__(self, spec: BenchSpec, clock: Clock) -> None:
-        """Wire a bench that the caller owns: drives disabled, each mechanism proved so.
-
-        Raises what opening a bench raises.
-        """
+        """Wire a bench that the caller owns: drives disabled, each mechanism proved so."""
         self.spec, self._clock = spec, clock
         with ExitStack() as stack:
             latch = LatchFile(spec.latch_file)

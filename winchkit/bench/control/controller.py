@@ -76,11 +76,7 @@ class _Order:
 
 
 class Controller:
-    """Phases from disabled over moving back to disabled.
-
-    ``begin``, ``run_down`` and ``stop`` may be called from any thread; they take effect in the
-    next ``step``.
-    """
+    """Phases from disabled over moving back; what a thread orders takes effect in the next step."""
 
     def __init__(self, axis: Cia402Axis, cable: CableMap, limits: LimitSpec) -> None:
         self.axis = axis
@@ -126,10 +122,7 @@ class Controller:
         return "" if reported else self.failure
 
     def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
-        """Start a source, enabling the drive first where needed; replaces the one before.
-
-        With a ``gate`` it waits, enabled and holding its place, until the gate opens.
-        """
+        """Start a source, enabling the drive first where needed; it waits enabled for the gate."""
         with self._lock:
             self.done = self.stopped = False
             self.failure = self.reason = ""
@@ -173,10 +166,7 @@ class Controller:
         return self.phase in _FOLLOWING and not self.axis.moves_alone
 
     def way(self, angle: float, arm: float) -> tuple[float, float]:
-        """Cable commanded and moved since the source began, in m, positive wound in.
-
-        ``angle`` is that of the motor (rad), ``arm`` in m/rad.
-        """
+        """Cable commanded and moved since the source began, m, positive wound in; arm in m/rad."""
         return (self._angle - self._origin) * arm, (angle - self._origin) * arm
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
@@ -196,10 +186,7 @@ class Controller:
         return words
 
     def step(self, now: float, time: float, sync: int = 0) -> None:
-        """Send this cycle's command; ``time`` is that of motion, in whole periods.
-
-        ``sync`` is the number of the SYNC that was just sent.
-        """
+        """Send this cycle's command; ``time`` is that of motion, ``sync`` counts the SYNCs sent."""
         self._time, self._sync = time, sync
         # As in most cycles nothing was ordered; what is ordered meanwhile is taken in the next.
         if self._ordered is not None or self._wanted is not None:

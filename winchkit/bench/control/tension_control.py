@@ -73,12 +73,7 @@ class TensionSetting:
 
 
 def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) -> float:
-    """Upper bound of the stiffness of a cable, N/m.
-
-    ``length``: free length, m. ``declared``: declared by the caller, N/m. Returns: declared value,
-    else axial stiffness of the profile, else that of a steel bar of the cable's diameter, divided
-    by the length. Raises UsageError where nothing is known of the cable.
-    """
+    """Upper bound of a cable's stiffness, N/m: as declared, by the profile, or of a steel bar."""
     if declared is not None:
         return declared
     axial = cable.axial_stiffness

@@ -52,10 +52,7 @@ def bus_only(interface: str, channel: str, bitrate: int, port: int | None) -> Be
 
 
 def nodes_on(spec: BenchSpec) -> list[ScannedNode]:
-    """Scan every CAN bus of a bench; the owner does it where there is one.
-
-    Raises FileError, ConnectionLost, NotPermitted.
-    """
+    """Scan every CAN bus of a bench, by its owner where there is one; raises ConnectionLost."""
     remote = attach(spec)
     if remote is not None:
         with remote:

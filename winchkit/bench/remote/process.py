@@ -60,10 +60,7 @@ def can_spawn(spec: BenchSpec) -> bool:
 
 
 def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
-    """Start a bench process and wait until it has opened the bench, or could not.
-
-    Raises OSError where no process can be started.
-    """
+    """Start a bench process and wait until it has opened the bench or could not; raises OSError."""
     files = [os.path.abspath(file) for file in (spec.path, *effects)]
     command = [sys.executable, "-P", "-m", "winchkit.bench.remote.process", *files]
     with log_path(spec).open("ab") as said:
