@@ -1,8 +1,4 @@
-"""CAN: the bus, CANopen services, CiA 402 drives, host loss, and tools.
-
-``bus`` moves frames, ``canopen`` has the services of CiA 301, ``cia402`` the drives, ``host_loss``
-their watchdogs, ``tools`` scan and settings; ``process_value`` is an instrument after CiA 404.
-"""
+"""CAN: the bus, CANopen services, CiA 402 drives, host loss, and tools."""
 
 from winchkit.python_can import import_python_can
 

@@ -43,10 +43,7 @@ class Instrument(InstrumentReadings):
         timeout: float,
         rate: float = inf,
     ) -> None:
-        """Poll as often as the device converts, at most ``rate`` times a second.
-
-        ``timeout`` (s) is the line's for one answer.
-        """
+        """Poll as often as the device converts, at most ``rate`` (1/s); ``timeout`` in s."""
         self.name = name
         self.unit = unit
         self.decoder = RegisterDecoder(device)

@@ -33,11 +33,7 @@ class StreamLine:
         opener: Opener = open_serial,
         pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
-        """Take the instruments of a line, which ``serve`` opens.
-
-        ``opener`` opens the port, ``pause`` waits while there is none. Raises FileError where a
-        device that sends by itself is not alone.
-        """
+        """Take the instruments of a line; ``pause`` waits while there is no port."""
         self.name = name
         self.sensors = instruments
         self._spec = spec

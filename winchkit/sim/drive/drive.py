@@ -31,10 +31,7 @@ _STORM_CODE = 0x8120
 
 
 class FrameSender:
-    """Sends frames at once, late, or not at all.
-
-    ``emergency`` sends an EMCY of a code; a storm calls it every millisecond.
-    """
+    """Sends frames at once, late, or not at all; a storm calls ``emergency`` every millisecond."""
 
     def __init__(
         self, send: Callable[[int, bytes], None], emergency: Callable[[int], None]

@@ -50,10 +50,7 @@ def decimals_of(field: FieldSpec) -> int:
 
 
 def encode(field: FieldSpec, counts: float) -> list[int]:
-    """Registers of a field, in the order of their addresses.
-
-    With a sign bit the registers have the magnitude; the sign is in the status word.
-    """
+    """Registers of a field in the order of their addresses; magnitudes where it has a sign bit."""
     return encode_number(
         field.type, field.order, abs(counts) if field.sign_bit is not None else counts
     )

@@ -25,10 +25,7 @@ _NO_NUMBER = 0x7FC00000
 
 
 class SimulatedProcessInstrument(SimulatedInstrument):
-    """One node. ``measure`` returns the present quantity in the unit of the device file.
-
-    ``send`` takes an identifier and data.
-    """
+    """One node. ``measure`` returns the present quantity in the unit of the device file."""
 
     KIND = "a simulated CANopen instrument"
     FAULTS = ("silence", "frozen", "overload", "sensor break", "reboot", "recover")

@@ -13,10 +13,7 @@ from winchkit.units import convert, dimension_of, factor
 
 
 class SimulatedStreamInstrument(SimulatedInstrument):
-    """One device on a serial line, with input :meth:`receive` and output :meth:`take_output`.
-
-    ``measure`` returns the present quantity in counts of the device (:func:`shown_by`).
-    """
+    """One device on a serial line; ``measure`` gives the quantity in counts of the device."""
 
     KIND = "a simulated serial instrument"
     FAULTS = (

@@ -1,7 +1,4 @@
-"""A simulated bench on real buses: plants, drives and instruments, for other processes.
-
-:mod:`~winchkit.sim.live.bench` assembles it and writes the bench file that opens it.
-"""
+"""A simulated bench on real buses: plants, drives and instruments, for other processes."""
 
 from winchkit.python_can import import_python_can
 

@@ -34,10 +34,7 @@ def instruments_of(
     *,
     now: float,
 ) -> dict[str, Instrument]:
-    """Instruments by role; ``quantities`` return the measured quantity of each role, SI.
-
-    ``send`` is for instruments on the CAN bus of the servo.
-    """
+    """Instruments by role; ``quantities`` return the measured quantity of each, SI."""
     found: dict[str, Instrument] = {}
     for role, measure in quantities.items():
         ref: DeviceRef | None = getattr(wiring, role)

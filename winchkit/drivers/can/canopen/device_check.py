@@ -155,10 +155,7 @@ def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
 
 
 def host_loss_problem(ways: tuple[HostLossObjects, ...], way: str) -> str:
-    """Why a drive cannot notice a dead host in a declared way; empty where its EDS allows it.
-
-    A maker's own way (``vendor:``) and hardware that stops the drive are not in an EDS.
-    """
+    """Why a drive cannot notice a dead host as declared, by its EDS; empty where it may."""
     names = [one.way for one in ways]
     if way in names or way == HARDWARE or way.startswith(VENDOR):
         return ""

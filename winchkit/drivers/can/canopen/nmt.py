@@ -1,7 +1,4 @@
-"""NMT of CiA 301: commands and states in words, heartbeat consumer and producer.
-
-The caller gives the time to both.
-"""
+"""NMT of CiA 301: commands and states in words, heartbeat consumer and producer."""
 
 from __future__ import annotations
 
@@ -35,10 +32,7 @@ _COMMANDS = {
 
 
 def state_text(state: int) -> str:
-    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have.
-
-    The byte is the device's own: one that the standard does not know must not end a loop.
-    """
+    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have."""
     return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
 
@@ -84,10 +78,7 @@ class HeartbeatConsumer:
 
 @dataclass
 class HeartbeatProducer:
-    """Times of the host's heartbeat.
-
-    The control loop evaluates it once per cycle, so that the heartbeat ends with the loop.
-    """
+    """Times of the host's heartbeat, asked for by the control loop so that it ends with that."""
 
     period: float
     """s."""

@@ -38,10 +38,7 @@ def codecs(node: SdoNode, specs: Iterable[PdoSpec]) -> tuple[PdoCodec, ...]:
 
 
 def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) -> None:
-    """Map ``wanted`` and switch every other PDO of this direction off, those beyond four too.
-
-    The node must be pre-operational. Raises NoReply, DeviceRefused.
-    """
+    """Map ``wanted`` on a pre-operational node and switch every other PDO of this direction off."""
     by_number = {codec.spec.number: codec for codec in wanted}
     for number in (*_PREDEFINED, *_beyond(node, direction)):
         record = COMMUNICATION[direction] + number - 1

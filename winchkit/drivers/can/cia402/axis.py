@@ -256,10 +256,7 @@ class Cia402Axis:
 
     @property
     def trim_angle(self) -> float:
-        """Angle that corrections of the cable force have turned since the last homing, rad.
-
-        The record of the position has it too.
-        """
+        """Angle that corrections of the cable force have turned since the last homing, rad."""
         return self._position.trim
 
     @trim_angle.setter
@@ -291,10 +288,7 @@ class Cia402Axis:
         self._position.note_zero(doubt)
 
     def define_position(self, angle: float) -> None:
-        """Let the disabled motor have an angle (rad), by a zero that the record keeps.
-
-        Raises NotPermitted while it moves, and where the drive itself limits its position.
-        """
+        """Let the disabled motor have an angle (rad), by a zero that the record keeps."""
         self._disabled_drive("define its position")
         self._require_unlimited()
         self._position.define(angle)
@@ -321,10 +315,7 @@ class Cia402Axis:
         self.host.disarm()
 
     def fall_silent(self) -> bool:
-        """End the life signs that the drive watches, until it is commissioned again.
-
-        Returns whether SYNC is one of them, which the control loop has to end.
-        """
+        """End the life signs that the drive watches; returns whether SYNC is one of them."""
         self.host.silent = True
         return self.host.mechanism.silence in (Silence.SYNC, Silence.ALL)
 
@@ -491,11 +482,7 @@ class Cia402Axis:
         self._position.changed_mode(previous, mode)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
-        """Set a homing up and change to HM, disabled; ``send`` with ENABLE and ``start`` runs it.
-
-        Afterwards ``switch_mode(servo.motion_mode)`` leads back. Raises NotPermitted, NoReply,
-        DeviceRefused.
-        """
+        """Set a homing up and change to HM, disabled; ``send`` with ``start`` runs it."""
         drive = self._disabled_drive("prepare a homing")
         set_homing(self._node, self.servo, drive.scale, homing)
         self.switch_mode("HM")
@@ -511,11 +498,7 @@ class Cia402Axis:
         set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
 
     def set_quick_stop(self, acceleration: float | None = None) -> None:
-        """Set the ramp of quick stops (rad/s^2), None for that of commissioning, before a motion.
-
-        Nothing is sent where the drive has it already. Raises NotPermitted, NoReply,
-        DeviceRefused.
-        """
+        """Set the ramp of quick stops (rad/s²), None for that of commissioning, before a motion."""
         wanted = self._watch.quick_stop if acceleration is None else acceleration
         if self.drive is None or wanted == self._quick_stop:
             return

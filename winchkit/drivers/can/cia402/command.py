@@ -161,10 +161,7 @@ class Commander:
         return word, self._packed(values)
 
     def stop_frames(self) -> list[tuple[int, bytes]]:
-        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets.
-
-        In quick stop the drive makes its own ramp, and no target counts (CiA 402-2).
-        """
+        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets."""
         values = self._zeros.copy()
         for place in self._controls:
             values[place] = QUICK_STOP

@@ -307,11 +307,7 @@ def await_booted(
 
 
 def _set_error_behaviour(node: SdoNode) -> int | None:
-    """Have the drive leave operational when the host is gone (1029h:1 = 0).
-
-    Returns what it keeps: 0 pre-operational, 2 stopped, 1 no change where it takes nothing else,
-    None without such an object. Raises NoReply, DeviceRefused.
-    """
+    """Have the drive leave operational when the host is gone; returns its 1029h:1, None without."""
     kept = node.read_if_there(0x1029, 1)
     if kept == 1 and node.writes(0x1029, 1):
         node.write(0x1029, 1, 0)

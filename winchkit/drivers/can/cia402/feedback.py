@@ -33,11 +33,7 @@ _KEPT = 3
 
 
 class AxisFeedback(NamedTuple):
-    """Feedback of a drive at one SYNC; SI at the motor shaft.
-
-    A named tuple, since one is made of every drive in every cycle: a frozen dataclass takes six
-    times as long to make.
-    """
+    """Feedback of a drive at one SYNC, SI at the motor shaft; a named tuple is made the fastest."""
 
     time: float
     """Estimate of the moment of sampling, on the bench's clock, s: the SYNC reaches the drive

@@ -100,10 +100,7 @@ def mode_named(number: int) -> str:
 
 
 def status_words(mode: str, status: int) -> tuple[str, ...]:
-    """The bits of a status word that are set beside the state, in words, for a mode.
-
-    ``mode``: a name; for another text those bits that have one meaning in all modes.
-    """
+    """Bits of a status word beside the state, in words; without a mode those that all share."""
     common = {
         int(StatusBit.WARNING): "warning",
         int(_LIMIT): "internal limit active",

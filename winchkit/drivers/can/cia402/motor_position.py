@@ -159,10 +159,7 @@ class MotorPosition:
         )
 
     def look(self, node: SdoNode) -> None:
-        """Look for signs of a power cycle; before the set-up writes anything.
-
-        Raises NoReply, DeviceRefused.
-        """
+        """Look for signs of a power cycle; before the set-up writes anything."""
         before = self._objects
         if self.counter is None:
             before = {} if self._kept is None else self._kept.objects

@@ -30,10 +30,7 @@ _QUICK_STOP = QUICK_STOP.to_bytes(2, "little")
 
 
 class SecondMaster:
-    """Commands to one drive from another master on the bus of a bench.
-
-    It listens from the beginning on; no interface hands back what is sent from here.
-    """
+    """Commands to one drive from another master; no interface hands back what is sent from here."""
 
     def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int], host: int) -> None:
         """Listen to the commands to ``node``; ``rpdos`` are the numbers of its RPDOs in use.

@@ -73,10 +73,7 @@ class Description:
 
 
 def read_description(path: str) -> Description:
-    """A device file by path or name, or an EDS, DCF, XDD or XDC.
-
-    Raises FileError for a file that cannot be read, and for a device that is on no CAN bus.
-    """
+    """A device file by path or name, or an EDS, DCF, XDD or XDC; raises FileError."""
     if Path(path).suffix.lower() in SUFFIXES:
         read_dictionary(Path(path), 1)
         return Description(path)
