@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -253,7 +252,7 @@ def _tell_notes(
     notes += [note for axis in axes.values() if axis.drive for note in axis.drive.notes]
     notes += [note for bus in buses.values() if (note := bus.foreign_sync)]
     for note in notes:
-        sys.stderr.write(f"{note}\n")
+        to_stderr(note)
 
 
 def _weight(winch: WinchWiring) -> float | None:
@@ -266,10 +265,8 @@ def _frozen_cell(spec: BenchSpec, winch: WinchWiring) -> FrozenCell | None:
     if winch.cell is None:
         return None
     device = device_of(spec, winch.cell)
-    table = device.modbus or device.stream or device.process
-    if table is None:
-        return None
-    return FrozenCell(table.rate, correlation=table.filter_delay)
+    table = device.instrument
+    return None if table is None else FrozenCell(table.rate, correlation=table.filter_delay)
 
 
 def _moving(axis: Cia402Axis, cable: CableMap) -> Callable[[], bool]:

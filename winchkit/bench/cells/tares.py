@@ -94,22 +94,8 @@ def restore_tares(desk: CellDesk, name: str, before: Mapping[str, Any]) -> dict[
     return {}
 
 
-def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Send the device its own tare; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "tare", duration)
-
-
-def clear_device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Let the device count gross again; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "gross", duration)
-
-
-def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Send the device its own zero; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "zero", duration)
-
-
-def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict[str, Any]:
+def by_device(desk: CellDesk, name: str, duration: float, *, command: str) -> dict[str, Any]:
+    """Send the device a volatile command; raises NotPermitted, NoReply, DeviceRefused."""
     desk.permit(name)
     before = steady(desk.readings(name, duration))
     desk.command(name, command)

@@ -12,7 +12,6 @@ import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from winchkit.arguments import path_of
@@ -41,6 +40,7 @@ from winchkit.bench.commissioning.record import (
 )
 from winchkit.bench.commissioning.trial import TrialResult, Trials
 from winchkit.bench.ownership import unless_stopped
+from winchkit.bench.recording.provenance import installed
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
@@ -363,13 +363,8 @@ def _now() -> str:
 
 
 def _software() -> Mapping[str, str]:
-    found = {"winchkit": __version__, "python": platform.python_version()}
-    for name in _LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    own = {"winchkit": __version__, "python": platform.python_version()}
+    return {**own, **installed(_LIBRARIES)}
 
 
 def commission(bench: str | Path, answers: str | Path | None = None) -> CommissioningRecord:

@@ -9,7 +9,7 @@ quick stop.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -25,6 +25,7 @@ from winchkit.drivers.can.cia402.state_machine import (
     QUICK_STOP,
     DriveState,
     RequestedState,
+    has_left,
     state_of,
 )
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
@@ -108,7 +109,7 @@ class Trials:
             if kind is None:
                 self._keep_positions()
             for axis in self.axes.values():
-                with _frames_lost():
+                with suppress(ConnectionLost):
                     axis.disarm()
 
     def _keep_positions(self) -> None:
@@ -131,7 +132,7 @@ class Trials:
             # Where any frame is a life sign the drive is not asked before its time is over.
             blind = limit + _TIMEOUT / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
             state, after = self._left(axis, start, blind, timeout)
-            stopped = _has_left(state)
+            stopped = has_left(state)
             if stopped:
                 self._await_rest(axis)
             travel = self._travel(name, axis, angle)
@@ -155,7 +156,7 @@ class Trials:
             axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start
-        return TrialResult(_has_left(state), after, str(state))
+        return TrialResult(has_left(state), after, str(state))
 
     def brake(self, name: str) -> TrialResult:
         """Enable the drive at rest, disable it, and see whether the cable moves after that."""
@@ -167,7 +168,7 @@ class Trials:
                 self._cycle(axis, RequestedState.DISABLE)
             travel = self._travel(name, axis, angle)
             state = _asked(axis)
-        return TrialResult(_has_left(state), _BRAKE_TIME, str(state), travel)
+        return TrialResult(has_left(state), _BRAKE_TIME, str(state), travel)
 
     @contextmanager
     def _ended(self, name: str) -> Iterator[Cia402Axis]:
@@ -182,7 +183,7 @@ class Trials:
         try:
             yield axis
         except BaseException:
-            with _frames_lost():
+            with suppress(ConnectionLost):  # the later steps are still necessary
                 axis.emergency_stop(sdo=True)
                 self._wired_syncs()
             # The reply to the stop by SDO is not for the confirmed client.
@@ -294,7 +295,7 @@ class Trials:
         while True:
             state = _asked(axis)
             after = self._clock.now() - start
-            if _has_left(state) or after > timeout:
+            if has_left(state) or after > timeout:
                 return state, after
             self._clock.sleep(_POLL)
 
@@ -329,11 +330,6 @@ def _timeout(mechanism: Mechanism) -> float:
     return _HARDWARE_TIMEOUT if nothing else mechanism.limit + _TIMEOUT
 
 
-def _has_left(state: DriveState) -> bool:
-    """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
-    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
-
-
 def _asked(axis: Cia402Axis) -> DriveState:
     """Power state by SDO; a drive whose network state is stopped has to leave that first."""
     node = axis.objects
@@ -349,12 +345,3 @@ def _angle(axis: Cia402Axis) -> float:
     if feedback is None:
         raise NotPermitted(f"{axis.name}: sends no PDOs on SYNC; check its PDO mapping")
     return feedback.angle
-
-
-@contextmanager
-def _frames_lost() -> Iterator[None]:
-    """Continue where a frame cannot be sent: the later steps are still necessary."""
-    try:
-        yield
-    except ConnectionLost:
-        return

@@ -22,7 +22,13 @@ from winchkit.bench.control.stop_escalation import StopEscalation, StopEvidence,
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, DriveState, RequestedState
+from winchkit.drivers.can.cia402.state_machine import (
+    ENABLE_OPERATION,
+    POWERED,
+    DriveState,
+    RequestedState,
+    has_left,
+)
 from winchkit.schema.bench import LimitSpec
 
 _ENABLE_TIME = 2.0
@@ -56,11 +62,6 @@ _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = DriveState.OPERATION_ENABLED
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
-_ENABLED = (
-    DriveState.OPERATION_ENABLED,
-    DriveState.QUICK_STOP_ACTIVE,
-    DriveState.FAULT_REACTION_ACTIVE,
-)
 
 
 @dataclass(frozen=True)
@@ -215,7 +216,7 @@ class Controller:
         feedback = self.axis.feedback
         self.source, self.commanded, self.done = None, 0.0, True
         self.escalation.end()
-        rests = feedback is not None and feedback.state not in _ENABLED and self.axis.at_rest
+        rests = feedback is not None and feedback.state not in POWERED and self.axis.at_rest
         self.phase = Phase.DISABLED if rests else Phase.STOPPING
 
     def _order(self, phase: Phase, reason: str = "") -> None:
@@ -430,7 +431,7 @@ class Controller:
             self.axis.end_stop()
             self._stop_sync = self._sync
             self.escalation.begin(now, nmt=self.axis.stops_on_nmt)
-        if sampled and feedback.state not in _ENABLED and self.axis.at_rest:
+        if sampled and feedback.state not in POWERED and self.axis.at_rest:
             self.escalation.end()
             self.axis.end_stop()
             self._enter(Phase.DISABLED, now)
@@ -439,9 +440,9 @@ class Controller:
         """Use the way to stop that is due in this cycle."""
         axis = self.axis
         fresh = feedback.sync > self._stop_sync and feedback.sync >= self._sync - _FRESH_SYNCS
-        left = fresh and _has_left(feedback.state)
+        left = fresh and has_left(feedback.state)
         by_sdo = axis.sdo_state
-        left = left or (by_sdo is not None and _has_left(by_sdo))
+        left = left or (by_sdo is not None and has_left(by_sdo))
         if self.escalation.method is StopMethod.NMT:
             left = left or not heard_by_sdo(axis.nmt_text)
         answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused
@@ -460,11 +461,6 @@ class Controller:
 def _keeps_enabled(word: int) -> bool:
     """Whether a control word keeps a drive in operation enabled."""
     return word & ENABLE_OPERATION == ENABLE_OPERATION
-
-
-def _has_left(state: DriveState) -> bool:
-    """Whether a status word says that the drive is not in operation enabled."""
-    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
 def heard_by_sdo(nmt: str) -> bool:

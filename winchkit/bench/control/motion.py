@@ -216,21 +216,17 @@ class RunDown:
     joins = True
 
     def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
-        self._duration = 0.0
+        self.duration = 0.0
+        """Time to rest, s; known once started."""
         self._cable, self._acceleration = cable, limits.acceleration
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
-
-    @property
-    def duration(self) -> float:
-        """Time to rest, s; known once started."""
-        return self._duration
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin from the target angle and the speed that were in force."""
         self._ramp = Ramp(self._acceleration, winding_speed)
         self._ramp.follow(0.0, time)
-        self._duration = abs(winding_speed) / self._acceleration
+        self.duration = abs(winding_speed) / self._acceleration
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, _now: float) -> Setpoint:

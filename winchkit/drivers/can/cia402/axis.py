@@ -38,6 +38,7 @@ from winchkit.drivers.can.cia402.profile_parameters import (
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.second_master import SecondMaster
 from winchkit.drivers.can.cia402.state_machine import (
+    POWERED,
     QUICK_STOP,
     DriveState,
     RequestedState,
@@ -59,11 +60,6 @@ _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
 _RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)
 _OPERATIONAL = int(NmtState.OPERATIONAL)
-_POWERED = (
-    DriveState.OPERATION_ENABLED,
-    DriveState.QUICK_STOP_ACTIVE,
-    DriveState.FAULT_REACTION_ACTIVE,
-)
 
 
 class Cia402Axis:
@@ -522,7 +518,7 @@ class Cia402Axis:
     def _disabled_drive(self, what: str) -> Commissioned:
         if self.drive is None:
             raise NotPermitted(f"{self.name}: commission the drive before you {what}")
-        if self.state in _POWERED or not self.at_rest:
+        if self.state in POWERED or not self.at_rest:
             raise NotPermitted(
                 f"{self.name}: cannot {what} while the drive is {self.state} and "
                 f"{'at rest' if self.at_rest else 'moving'}; stop it first"

@@ -28,6 +28,17 @@ class DriveState(IntEnum):
 
 
 _STATE_WORDS = tuple(state.name.lower().replace("_", " ") for state in DriveState)
+POWERED = (
+    DriveState.OPERATION_ENABLED,
+    DriveState.QUICK_STOP_ACTIVE,
+    DriveState.FAULT_REACTION_ACTIVE,
+)
+"""States in which the power stage may turn the motor."""
+
+
+def has_left(state: DriveState) -> bool:
+    """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
+    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
 class StatusBit(IntEnum):
