@@ -8,6 +8,8 @@ from math import inf
 from statistics import median
 from typing import Protocol, TypeVar
 
+from winchkit.drivers.reading import Sensor
+
 QUICK_RETRIES = 2
 """Failures in a row after which an instrument is polled at once again; a further one makes it rare,
 so that others on the line keep their rates."""
@@ -93,6 +95,24 @@ class LineShare:
     def time_of(self, index: int) -> float:
         """How long a reading keeps the line busy, s."""
         return self._times[index]
+
+
+class SharedLine:
+    """A line that shares its time out among its instruments."""
+
+    sensors: Sequence[Sensor]
+    _share: LineShare
+
+    def room_for(self, sensor: Sensor) -> float:
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
+        return self._share.room_for(self._place(sensor))
+
+    def time_of(self, sensor: Sensor) -> float:
+        """How long a reading of an instrument keeps the line busy, s."""
+        return self._share.time_of(self._place(sensor))
+
+    def _place(self, sensor: Sensor) -> int:
+        return next(k for k, item in enumerate(self.sensors) if item is sensor)
 
 
 def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:

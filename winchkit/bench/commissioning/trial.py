@@ -17,7 +17,7 @@ from winchkit.bench.control.cable import CableMap
 from winchkit.bench.hardware import Wired, wire
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
-from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtCommand, NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import (
@@ -57,8 +57,6 @@ _POLL = 0.002
 """s: resolution of a measured reaction, 2 % of the shortest limit."""
 _REPLY_TIME = 0.1
 """Within which a drive has answered an SDO request that needs no ramp, s."""
-_PRE_OPERATIONAL = 0x80
-"""NMT command specifier "enter pre-operational" (CiA 301)."""
 _HALF = 1 << 31
 """Half the range of 6064h (INTEGER32), past which its counts wrap."""
 
@@ -153,7 +151,7 @@ class Trials:
             axis.stop_by_nmt()
             self._run(axis, 0.0, _NMT_TIME, name)
             # Only a state with SDO can be asked; RPDOs are not processed in it.
-            axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
+            axis.objects.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start
         return TrialResult(has_left(state), after, str(state))
@@ -206,12 +204,12 @@ class Trials:
         axis = self.axes[name]
         node = axis.objects
         # A drive that stopped (1029h:1 = 2, NMT stopped) answers SDO only when pre-operational.
-        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         if state_of(node.read(0x6041)) is DriveState.OPERATION_ENABLED:
             node.write(0x6040, 0, QUICK_STOP)
         self._await_rest(axis)
         for one in self.axes.values():
-            one.objects.bus.nmt(_PRE_OPERATIONAL, one.objects.node)
+            one.objects.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, one.objects.node)
             one.objects.write(0x6040, 0, DISABLE_VOLTAGE)
             bring_back(one.objects, self._clock, clears=True)
             one.commission()
@@ -336,7 +334,7 @@ def _asked(axis: Cia402Axis) -> DriveState:
     try:
         return state_of(node.read(0x6041))
     except NoReply:
-        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         return state_of(node.read(0x6041))
 
 

@@ -99,14 +99,6 @@ class Instrument(InstrumentReadings):
         self._failures = 0
         self.due = self._clock.now()
 
-    def reopened(self) -> None:
-        """Note that the connection was replaced, because something else than the answer came."""
-        self.publisher.tally.reconnects += 1
-
-    def lost(self, error: ConnectionLost) -> None:
-        """Note that the line is closed."""
-        self.problem = error
-
     async def poll(self, client: ModbusClient) -> bool:
         """Take one reading, and say whether there is one.
 

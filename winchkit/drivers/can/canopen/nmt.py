@@ -22,12 +22,21 @@ class NmtState(IntEnum):
 
 NMT_STATES = frozenset(int(state) for state in NmtState)
 """State bytes of CiA 301."""
-_COMMANDS = {
-    0x01: "start",
-    0x02: "stop",
-    0x80: "enter pre-operational",
-    0x81: "reset node",
-    0x82: "reset communication",
+
+
+class NmtCommand(IntEnum):
+    """NMT command specifier."""
+
+    START = 0x01
+    STOP = 0x02
+    ENTER_PRE_OPERATIONAL = 0x80
+    RESET_NODE = 0x81
+    RESET_COMMUNICATION = 0x82
+
+
+_WORDS = {
+    int(command): command.name.lower().replace("_", " ").replace("pre ", "pre-")
+    for command in NmtCommand
 }
 
 
@@ -38,7 +47,7 @@ def state_text(state: int) -> str:
 
 def command_text(command: int) -> str:
     """NMT command specifier in words; the number of one that CiA 301 does not have."""
-    return _COMMANDS.get(command, f"unknown ({command:02X}h)")
+    return _WORDS.get(command, f"unknown ({command:02X}h)")
 
 
 @dataclass

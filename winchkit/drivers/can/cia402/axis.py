@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
-from winchkit.drivers.can.canopen.nmt import NmtState, state_text
+from winchkit.drivers.can.canopen.nmt import NmtCommand, NmtState, state_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.command import Commander, CycleCommand
@@ -54,8 +54,6 @@ _STALE_SYNCS, _STALE_BEATS = 5, 2
 """Feedback that is older than both of these does not show the drive's state any more."""
 _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
-_NMT_STOP = 0x02
-"""NMT command specifier "stop remote node" (CiA 301)."""
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
 _RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)
@@ -178,7 +176,7 @@ class Cia402Axis:
 
     def stop_by_nmt(self) -> None:
         """NMT stop; raises ConnectionLost."""
-        self._bus.nmt(_NMT_STOP, self._node.node)
+        self._bus.nmt(NmtCommand.STOP, self._node.node)
 
     def end_stop(self) -> None:
         """End the stop by SDO: its replies go to the confirmed client again."""

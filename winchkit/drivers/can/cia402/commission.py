@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtCommand, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
@@ -134,8 +134,6 @@ def _kept(node: SdoNode) -> float | None:
     return float(value * 10.0**exponent)
 
 
-_START, _PRE_OPERATIONAL = 0x01, 0x80
-"""NMT command specifiers "start remote node" and "enter pre-operational" (CiA 301)."""
 _STOP_TIME = 3.0
 """s: three times the quick stop from 1 m/s with 1 m/s² (rule of thumb); tenfold, a drive that does
 not stop would be reported after half a minute."""
@@ -232,7 +230,7 @@ def commission(
     Raises NoReply, DeviceRefused, and NotPermitted where the drive could not be moved safely.
     """
     _bring_to_rest(node, servo, clock)
-    node.bus.nmt(_PRE_OPERATIONAL, node.node)
+    node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
     notes = set_communication(node)
     mode = servo.motion_mode
     modes = supported_modes(node, servo, mode)
@@ -252,7 +250,7 @@ def commission(
         # The drive's own ramps must not come in the way of those that the host makes.
         set_profile(node, servo, scale, acceleration=watch.acceleration)
     node.require_alone()
-    node.bus.nmt(_START, node.node)
+    node.bus.nmt(NmtCommand.START, node.node)
     loss = host.reaction(None, options, seen=watch.seen_stopping)
     stops = watch.stops_on_nmt
     return Commissioned(
@@ -301,7 +299,7 @@ def await_booted(
                         "switch the drive off and on"
                     ) from error
                 raise
-            node.bus.nmt(_PRE_OPERATIONAL, node.node)
+            node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         else:
             return
 

@@ -34,6 +34,7 @@ POWERED = (
     DriveState.FAULT_REACTION_ACTIVE,
 )
 """States in which the power stage may turn the motor."""
+FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 
 
 def has_left(state: DriveState) -> bool:
@@ -44,13 +45,9 @@ def has_left(state: DriveState) -> bool:
 class StatusBit(IntEnum):
     """Bits of the status word 6041h beside the state."""
 
-    VOLTAGE_ENABLED = 1 << 4
     WARNING = 1 << 7
-    REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT = 1 << 11
-    FOLLOWS_COMMAND = 1 << 12
-    """In cyclic modes."""
 
 
 class RequestedState(Enum):

@@ -19,12 +19,11 @@ from canopen.objectdictionary import ODVariable, datatypes
 
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.node import Objects, Value, object_name, variables
+from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.cia402.state_machine import DriveState, state_of
 from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
-
-Key = tuple[int, int]
 
 STORE, RESTORE = (0x1010, b"save"), (0x1011, b"load")
 """Object and signature that store all parameters, and bring back the maker's."""

@@ -16,7 +16,7 @@ from typing import Any
 from winchkit.can_trace import TraceFrame
 from winchkit.drivers.can.canopen.declared import configured_value
 from winchkit.drivers.can.canopen.node import object_name, read_dictionary, variables
-from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.canopen.pdo import Key, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import (
     COMMUNICATION,
     INVALID,
@@ -26,10 +26,9 @@ from winchkit.drivers.can.canopen.pdo_parameters import (
     cob_id,
 )
 from winchkit.drivers.can.cia402.modes import mode_named
-from winchkit.drivers.can.cia402.units import CountScale, UnitObjects, scale_of
+from winchkit.drivers.can.cia402.units import CountScale, scale_of, units_by
 from winchkit.drivers.can.tools.decode import (
     DecodedFrame,
-    Key,
     KnownNode,
     MappedPdo,
     content_text,
@@ -204,23 +203,10 @@ class TracedNode:
         if servo is None:
             return None
 
-        def ratio(index: int) -> float | None:
-            above, below = self.seen.get((index, 1)), self.seen.get((index, 2))
-            return above / below if above and below else None
+        def seen(index: int, sub: int) -> int | None:
+            return None if (index, sub) not in self.seen else int(self.seen[index, sub])
 
-        def code(index: int) -> int | None:
-            return None if (index, 0) not in self.seen else int(self.seen[index, 0])
-
-        units = UnitObjects(
-            encoder=ratio(0x608F),
-            gear=ratio(0x6091),
-            feed=ratio(0x6092),
-            position=code(0x60A8),
-            velocity=code(0x60A9),
-            rated_torque=1e-3 * self.seen.get((0x6076, 0), 0.0) or None,
-            rated_current=1e-3 * self.seen.get((0x6075, 0), 0.0) or None,
-        )
-        return scale_of(units, servo)
+        return scale_of(units_by(seen), servo)
 
     def process_value(self) -> tuple[str, str, float] | None:
         """Name of the object of an instrument's value, its unit, and the value of a count in it."""
