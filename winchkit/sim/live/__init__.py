@@ -1,4 +1,7 @@
-"""A simulated bench on real buses: plants, drives and instruments, for other processes."""
+"""A simulated bench on real buses: plants, drives and instruments, for other processes.
+
+:mod:`~winchkit.sim.live.bench` assembles it and writes the bench file that opens it.
+"""
 
 from winchkit.python_can import import_python_can
 

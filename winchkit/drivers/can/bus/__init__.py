@@ -1,1 +1,5 @@
-"""A CAN bus: interface, receive thread, health counters and load; it interprets no protocol."""
+"""A CAN bus: interface, receive thread, health counters and load.
+
+:class:`~winchkit.drivers.can.bus.bus.CanBus` distributes frames by identifier;
+it interprets no protocol.
+"""

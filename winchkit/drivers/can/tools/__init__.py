@@ -1,1 +1,5 @@
-"""Tools on a CAN bus for the user: scan, info, settings, and frames in words."""
+"""Tools on a CAN bus for the user: scan, info, settings, and frames in words.
+
+``scan`` lists nodes, ``info`` describes one, ``config`` saves, compares and writes settings,
+``decode`` explains frames.
+"""
