@@ -6,11 +6,10 @@ import itertools
 import math
 import random
 import time
-from collections.abc import Iterator
 
 import pytest
 
-from drive_on_bus import CLOCK, Driven, DriveOnBus, device, driven_bus, run_cycles, run_until
+from drive_on_bus import CLOCK, Driven, DriveOnBus, device, run_cycles, run_until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
@@ -18,12 +17,6 @@ from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import NoReply, NotPermitted
 
 _marks = itertools.count(1)
-
-
-@pytest.fixture
-def rig() -> Iterator[Driven]:
-    with driven_bus() as made:
-        yield made
 
 
 def axis_on(bus: CanBus, *, brake: bool = True, node: int = 1, cycle: float = 0.004) -> Cia402Axis:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 
 import pytest
 
-from drive_on_bus import CLOCK, Driven, DriveOnBus, bus_spec, device, driven_bus
+from drive_on_bus import CLOCK, Driven, DriveOnBus, bus_spec, device
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -17,12 +16,6 @@ from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import NotPermitted
 
 HOST, HEARTBEAT = 127, 0.05
-
-
-@pytest.fixture
-def rig() -> Iterator[Driven]:
-    with driven_bus() as made:
-        yield made
 
 
 def axis_on(
