@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from winchkit.bench.control.cable import CableMap
+from winchkit.bench.control.controller import ENABLE_TIME
 from winchkit.bench.hardware import Wired, wire
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
@@ -34,8 +35,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import ConnectionLost, MotionError, NoReply, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
-_ENABLE_TIME = 2.0
-"""s: drives take some tenths, and with a brake to open about one."""
 _SETTLE_TIME = 0.3
 """s: oscillation at rest after enabling has decayed before a trial."""
 _MOVE_TIME = 0.8
@@ -218,12 +217,12 @@ class Trials:
         self._keep(name, kept and replace(kept, count=node.read(0x6064)))
 
     def _enable(self, axis: Cia402Axis) -> None:
-        deadline = self._clock.now() + _ENABLE_TIME
+        deadline = self._clock.now() + ENABLE_TIME
         while axis.state is not DriveState.OPERATION_ENABLED:
             self._cycle(axis, RequestedState.ENABLE)
             if self._clock.now() > deadline:
                 raise NotPermitted(
-                    f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after the command to "
+                    f"{axis.name}: still {axis.state} {ENABLE_TIME:g} s after the command to "
                     f"enable: {axis.fault_text}; look at its enable input, supply and errors"
                 )
         self._hold = _angle(axis)

@@ -31,8 +31,8 @@ from winchkit.drivers.can.cia402.state_machine import (
 )
 from winchkit.schema.bench import LimitSpec
 
-_ENABLE_TIME = 2.0
-"""s, as in the trials of a commissioning: drives take some tenths, and about one with a brake."""
+ENABLE_TIME = 2.0
+"""s: drives take some tenths, and with a brake to open about one."""
 _GATE_TIME = 5.0
 """Time for which an enabled drive waits for others that start with it, s."""
 _RESET_TIME = 1.0
@@ -347,9 +347,9 @@ class Controller:
         if enabled and self._held is None:
             self._held = feedback.angle
         self._word = self.axis.send(RequestedState.ENABLE, angle=self._held)
-        if now - self._since > (_GATE_TIME if enabled else _ENABLE_TIME):
+        if now - self._since > (_GATE_TIME if enabled else ENABLE_TIME):
             waiting = "waits for a winch that was to start with it"
-            stays = f"the drive stays {feedback.state} for {_ENABLE_TIME:g} s"
+            stays = f"the drive stays {feedback.state} for {ENABLE_TIME:g} s"
             self._fail(waiting if enabled else stays, now)
 
     def _move(self, now: float, feedback: AxisFeedback) -> None:

@@ -22,9 +22,6 @@ from winchkit.errors import DeviceRefused, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
 
-_LISTEN = 1.1
-"""For heartbeats, whose period is a second at most where they are of use, s."""
-
 
 @dataclass(frozen=True)
 class Node:
@@ -61,7 +58,7 @@ def nodes_on(spec: BenchSpec) -> list[ScannedNode]:
     with _owning(spec):
         for name in _can_buses(spec):
             with _open(spec, name) as bus:
-                found += scan(bus, spec.bus[name], bus.clock, _LISTEN)
+                found += scan(bus, spec.bus[name], bus.clock)
     return named_after(spec, found)
 
 

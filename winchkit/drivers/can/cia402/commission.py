@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtCommand, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
-from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
+from winchkit.drivers.can.canopen.pdo_parameters import INVALID, codecs, set_up
 from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_limits
 from winchkit.drivers.can.cia402.modes import MODES, change_mode, supported_modes
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
@@ -25,8 +25,6 @@ from winchkit.schema.devices.servo import OptionSpec, ServoSpec
 _SYNC, _EMCY = 0x080, 0x080
 _PRODUCES = 1 << 30
 """Of 1005h: the device sends SYNC itself."""
-_INVALID = 1 << 31
-"""Of 1014h: no EMCY is sent."""
 _IDENTIFIER = 0x1FFFFFFF
 """Bits 0 to 28 of 1005h and 1014h (CiA 301): CAN-ID, with those of extended frames."""
 
@@ -66,17 +64,17 @@ def _sync(node: SdoNode) -> tuple[str, ...]:
 def _emergency(node: SdoNode) -> tuple[str, ...]:
     kept = node.read_if_there(0x1014)
     wanted = _EMCY + node.node
-    if kept is None or kept & (_INVALID | _IDENTIFIER) == wanted:
+    if kept is None or kept & (INVALID | _IDENTIFIER) == wanted:
         return ()
     place = node.place(0x1014)
     try:
-        node.write(0x1014, 0, kept | _INVALID)
-        node.write(0x1014, 0, wanted | _INVALID)
+        node.write(0x1014, 0, kept | INVALID)
+        node.write(0x1014, 0, wanted | INVALID)
         node.write(0x1014, 0, wanted)
         now = node.read(0x1014)
     except DeviceRefused:
         now = kept
-    if now & (_INVALID | _IDENTIFIER) != wanted:
+    if now & (INVALID | _IDENTIFIER) != wanted:
         return (f"{place} is {kept:X}h and cannot be set to {wanted:X}h: its EMCY is not received",)
     return (f"{place} was {kept:X}h, EMCY was not received; it is {wanted:X}h now",)
 

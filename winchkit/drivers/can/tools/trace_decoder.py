@@ -19,9 +19,11 @@ from winchkit.drivers.can.canopen.node import object_name, read_dictionary, vari
 from winchkit.drivers.can.canopen.pdo import Key, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import (
     COMMUNICATION,
+    IDENTIFIER,
     INVALID,
     MAPPING,
     MOST_PDOS,
+    PREDEFINED,
     Direction,
     cob_id,
 )
@@ -44,11 +46,9 @@ from winchkit.schema.eds.eds import SUFFIXES
 from winchkit.schema.read import read_device
 
 _DIRECTIONS: tuple[Direction, Direction] = ("tpdo", "rpdo")
-_IDENTIFIER = 0x7FF
 _REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY = 0x600, 0x580, 0x700, 0x080
 _STORE, _MODE = 0x1010, (0x6061, 0)
 _IDENTITY = ((0x1018, 1, "vendor"), (0x1018, 2, "product"))
-_PREDEFINED = range(1, 5)
 
 
 @dataclass(frozen=True)
@@ -259,7 +259,7 @@ class TraceDecoder:
         """Meaning of a frame; raises FileError for an EDS that does not fit a node's number."""
         identifier, data = frame.identifier, frame.data
         node, base = identifier & 0x7F, identifier & ~0x7F
-        if identifier > _IDENTIFIER:
+        if identifier > IDENTIFIER:
             return DecodedFrame("other", 0, data.hex(" "))
         if base in (_REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY) and node:
             return self._of_service(base, data, self._hear(node), frame)
@@ -319,7 +319,7 @@ def _configured(dictionary: Any) -> dict[Key, float]:
         if variable.index in _PDO_RECORDS and (value := configured_value(variable)) is not None:
             found[variable.index, variable.subindex] = value
     for direction in _DIRECTIONS:
-        for number in _PREDEFINED:
+        for number in PREDEFINED:
             record = COMMUNICATION[direction] + number - 1
             if record in dictionary and dictionary.node_id is not None:
                 found.setdefault((record, 1), cob_id(direction, number, dictionary.node_id))
@@ -347,7 +347,7 @@ def _pdos(values: Mapping[Key, float], node: int) -> dict[int, MappedPdo]:
     found = {}
     for direction in _DIRECTIONS:
         for number in range(1, MOST_PDOS + 1):
-            default = cob_id(direction, number, node) if number in _PREDEFINED else INVALID
+            default = cob_id(direction, number, node) if number in PREDEFINED else INVALID
             identifier = int(values.get((COMMUNICATION[direction] + number - 1, 1), default))
             mapping = MAPPING[direction] + number - 1
             count = int(values.get((mapping, 0), 0))
@@ -356,5 +356,5 @@ def _pdos(values: Mapping[Key, float], node: int) -> dict[int, MappedPdo]:
                 continue
             keys = tuple((entry >> 16, entry >> 8 & 0xFF) for entry in entries)
             sizes = tuple(entry & 0xFF for entry in entries)
-            found[identifier & _IDENTIFIER] = MappedPdo(direction.upper(), number, keys, sizes)
+            found[identifier & IDENTIFIER] = MappedPdo(direction.upper(), number, keys, sizes)
     return found
