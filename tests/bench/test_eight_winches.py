@@ -8,13 +8,11 @@ from collections.abc import Iterator
 import pytest
 
 from bare_winches import bare_winches
-from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.buses import BusWire, Carried
+from winchkit.testing.opened import OpenedBench
 
 NAMES = "ABCDEFGH"
 SYNC, RPDO = 0x080, 0x200
@@ -49,22 +47,14 @@ class Witness:
 
 
 @pytest.fixture(scope="module")
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture(scope="module")
-def live(clock: SimulatedClock) -> Iterator[LiveBench]:
-    with LiveBench(
-        bare_winches(NAMES, cycle=0.02, heartbeat=0.2), seed=1, simulated_time=clock
-    ) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def bench(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
-    with open_bench(live.bench_spec, clock) as opened:
+def sim() -> Iterator[OpenedBench]:
+    with OpenedBench(bare_winches(NAMES, cycle=0.02, heartbeat=0.2), seed=1) as opened:
         yield opened
+
+
+@pytest.fixture
+def bench(sim: OpenedBench) -> Bench:
+    return sim.bench
 
 
 def nodes_at_first(cycles: list[dict[int, tuple[int, int]]], word: int) -> set[int]:
@@ -77,10 +67,10 @@ def nodes_at_first(cycles: list[dict[int, tuple[int, int]]], word: int) -> set[i
 
 
 @pytest.mark.slow
-def test_they_are_enabled_start_and_stop_within_one_sync(live: LiveBench, bench: Bench) -> None:
+def test_they_are_enabled_start_and_stop_within_one_sync(sim: OpenedBench, bench: Bench) -> None:
     everybody = set(range(1, len(NAMES) + 1))
     targets = {name: 3.9 + 0.02 * n for n, name in enumerate(NAMES)}
-    with Witness(live.wire["can"]) as witness:
+    with Witness(sim.live.wire["can"]) as witness:
         bench.move_together(targets, speed=0.2, wait=False, hold=True)
         while any(bench.winch[name].moving for name in NAMES):
             bench.raise_trouble()
@@ -119,10 +109,10 @@ def test_a_stop_of_one_stops_all(bench: Bench) -> None:
         bench.winch["A"].wait()
 
 
-def test_a_fault_of_one_is_reported_to_every_waiting_client(live: LiveBench, bench: Bench) -> None:
+def test_a_fault_of_one_is_reported_to_every_waiting_client(sim: OpenedBench, bench: Bench) -> None:
     bench.move_together(dict.fromkeys(NAMES, 3.0), speed=0.1, wait=False)
     until_moving(bench)
-    live.inject("D.servo", "over-current")
+    sim.live.inject("D.servo", "over-current")
     with pytest.raises(DriveFault, match="winch D"):
         bench.winch["A"].wait()
     bench.wait_at_rest(NAMES)

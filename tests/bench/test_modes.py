@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +10,13 @@ import numpy as np
 import pytest
 
 from winchkit import catalog, open_bench
-from winchkit.bench.bench import Bench
 from winchkit.cli.bench.keyboard_jog import HeldKey, Press, split_keys
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
+from winchkit.testing.opened import OpenedBench
 
 
 def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
@@ -43,34 +40,21 @@ def declared(tmp_path: Path, mode: str = "CSV", winches: str = "A") -> SimBench:
     )
 
 
-@contextmanager
-def paced(declaration: SimBench) -> Iterator[tuple[LiveBench, Bench]]:
-    """A live bench and its owner, whose time stands still while this machine is busy."""
-    clock = SimulatedClock()
-    with (
-        LiveBench(declaration, simulated_time=clock) as live,
-        open_bench(live.bench_spec, clock) as bench,
-    ):
-        yield live, bench
-
-
-@pytest.mark.realtime
 @pytest.mark.parametrize("mode", ["CSP", "PV"])
 def test_the_same_motion_in_another_mode(mode: str, tmp_path: Path) -> None:
-    with paced(declared(tmp_path, mode)) as (live, bench):
-        winch = bench.winch["A"]
+    with OpenedBench(declared(tmp_path, mode)) as sim:
+        winch = sim.bench.winch["A"]
         winch.move_to(3.7, 0.3)
-        with live.up_to_date():
-            assert live.winches["A"].plant.cable_length == pytest.approx(3.7, abs=5e-3)
+        with sim.live.up_to_date():
+            assert sim.live.winches["A"].plant.cable_length == pytest.approx(3.7, abs=5e-3)
         winch.jog(pay_out=0.2, duration=0.5)
         assert 3.73 < winch.cable_length < 3.81
-        assert not bench.snapshot.tripped
+        assert not sim.bench.snapshot.tripped
 
 
-@pytest.mark.realtime
 def test_two_winches_move_together_and_share_a_log(tmp_path: Path) -> None:
-    with paced(declared(tmp_path, winches="AB")) as (live, bench):
-        path = tmp_path / "two.csv"
+    with OpenedBench(declared(tmp_path, winches="AB")) as sim:
+        bench, path = sim.bench, tmp_path / "two.csv"
         with bench.log(path):
             bench.winch["A"].move_to(3.7, 0.3, wait=False)
             bench.winch["B"].move_to(4.2, 0.3, wait=False)
@@ -83,7 +67,7 @@ def test_two_winches_move_together_and_share_a_log(tmp_path: Path) -> None:
             assert own["cable_length"][-1] == pytest.approx(length, abs=5e-3)
             assert np.isfinite(own["tension"]).mean() > 0.95
         bench.winch["A"].move_to(3.0, 0.3, wait=False)
-        live.inject("B.servo", "silence")
+        sim.live.inject("B.servo", "silence")
         with pytest.raises(Exception, match="winch B"):
             bench.winch["A"].wait()
         assert bench.winch["A"].cable_length > 3.1

@@ -7,46 +7,33 @@ from pathlib import Path
 
 import pytest
 
-from winchkit import catalog, open_bench
-from winchkit.bench.bench import Bench
+from winchkit import catalog
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.programme import run_programme
 from winchkit.errors import MotionError, NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
+from winchkit.testing.opened import OpenedBench
 
 
 @pytest.fixture(scope="module")
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture(scope="module")
-def live(clock: SimulatedClock) -> Iterator[LiveBench]:
-    declared = read_simbench(catalog.find("sim", "demo-adequate"))
-    with LiveBench(declared, simulated_time=clock) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def bench(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
-    with open_bench(live.bench_spec, clock) as opened:
+def sim() -> Iterator[OpenedBench]:
+    with OpenedBench(read_simbench(catalog.find("sim", "demo-adequate"))) as opened:
         yield opened
 
 
 def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
-    live: LiveBench, bench: Bench, tmp_path: Path
+    sim: OpenedBench, tmp_path: Path
 ) -> None:
     """The winch stands then, so that the stop ends no motion; the next one must not begin."""
+    bench = sim.bench
     steps = (
         ProgrammeStep(by=-0.1, speed=0.4),
         ProgrammeStep(hold=2.0),
         ProgrammeStep(by=-0.5, speed=0.4),
     )
-    plant, places = live.winches["A"].plant, []
+    plant, places = sim.live.winches["A"].plant, []
 
     def stop(_repeat: int, _number: int, step: ProgrammeStep) -> None:
         if step.hold is not None:
@@ -62,9 +49,10 @@ def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
 
 
 def test_a_programme_that_is_refused_writes_no_file(
-    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    sim: OpenedBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An empty run would have to be removed before the next attempt."""
+    bench = sim.bench
     monkeypatch.setattr(bench, "not_commissioned", "there is no commissioning record")
     steps = (ProgrammeStep(by=-0.1, speed=0.4),)
     begun = []
@@ -80,9 +68,9 @@ def test_a_programme_that_is_refused_writes_no_file(
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_quick_stop_ends_a_held_tension(live: LiveBench, bench: Bench) -> None:
+def test_a_quick_stop_ends_a_held_tension(sim: OpenedBench) -> None:
     """And whoever goes on refreshing it is refused."""
-    winch, plant = bench.winch["A"], live.winches["A"].plant
+    bench, winch, plant = sim.bench, sim.bench.winch["A"], sim.live.winches["A"].plant
     wanted = winch.snapshot.load_tension + 30.0  # the load hangs free: the winch winds in
 
     def stop(snapshot: BenchSnapshot) -> None:

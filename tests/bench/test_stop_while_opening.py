@@ -17,6 +17,7 @@ from slave import Slave, State
 from slave.on_bus import SlavesOnBus
 from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
+from waiting import until
 from winchkit.bench.ownership import mark_stop
 from winchkit.bench.remote import session
 from winchkit.bench.remote.session import at_station
@@ -106,10 +107,7 @@ def test_a_jog_that_a_stop_met_ends_with_5(slow: tuple[Path, SlavesOnBus], momen
 
     slave.watch = watch
     jog = command(path, "jog", "A", "--pay-out", "0.05 m/s", "--for", "3s")
-    deadline = time.monotonic() + 60
-    while not any(f.identifier == 0x601 for _, f in running.heard):
-        assert time.monotonic() < deadline, "nothing is opened"
-        time.sleep(0.01)
+    until(lambda: any(f.identifier == 0x601 for _, f in running.heard), 60.0)
     time.sleep(moment)
     stop = command(path, "stop")
     _, said = stop.communicate(timeout=60)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,17 +19,6 @@ from winchkit.errors import UsageError
 
 NO_NUMBERS: list[Any] = ["0.1", "0.1 m/s", math.nan, math.inf, True, [0.1], {}]
 NOT_POSITIVE: list[Any] = [0, -1, -0.1]
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Rig:
-    return Rig(tmp_path)
-
-
-@pytest.fixture
-def bench(rig: Rig) -> Iterator[Bench]:
-    with rig.opened() as opened:
-        yield opened
 
 
 @pytest.fixture

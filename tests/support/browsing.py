@@ -39,7 +39,8 @@ def chromium() -> Iterator[Any]:
 class Served:
     """``winchkit serve`` in a process of its own."""
 
-    def __init__(self, *arguments: str, folder: Path | None = None) -> None:
+    def __init__(self, *arguments: str, folder: Path = Path()) -> None:
+        self.folder = folder
         command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
         assert self.process.stdout is not None

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 _WATCHED = 2.0
 """Frames are collected for so long after somebody asked for them, s."""
-_LISTEN = 1.1
-"""For heartbeats of nodes that are no winch, s."""
 
 
 class BenchConnection(ABC):
@@ -203,7 +201,7 @@ class BenchConnection(ABC):
         found = []
         for name, bus in self._wired.buses.items():
             own = {ref.node or 1: self.axes[w] for w, ref in wiring.items() if ref.bus == name}
-            found += scan(bus, self.spec.bus[name], self.clock, _LISTEN, own)
+            found += scan(bus, self.spec.bus[name], self.clock, own)
         return named_after(self.spec, found)
 
     def log(

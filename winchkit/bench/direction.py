@@ -22,11 +22,7 @@ def directed(change: float) -> DirectionKeyword:
 
 
 def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:
-    """The one that is given, positive paying out: a cable speed, or a change of cable length.
-
-    ``what`` names the call in the message. Raises UsageError unless exactly one is given, finite
-    and above zero.
-    """
+    """The one that is given, positive paying out; raises UsageError unless it is one above zero."""
     if (pay_out is None) == (wind_in is None):
         count = "neither" if pay_out is None else "both"
         raise UsageError(f"{what} needs one of pay_out= and wind_in=, and has {count}")

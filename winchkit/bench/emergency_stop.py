@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit.arguments import require_type
 from winchkit.bench.ownership import mark_stop
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
-from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, DriveState, state_of
+from winchkit.drivers.can.cia402.state_machine import POWERED, QUICK_STOP, DriveState, state_of
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec, WinchWiring
@@ -27,11 +26,6 @@ _POLL = 0.02
 """s: each look is two SDO requests (2 ms at 1 Mbit/s) per drive."""
 _INSIST = 0.2
 """For drives that have not taken the first command, s: ten further ones."""
-_MOVING = (
-    DriveState.OPERATION_ENABLED,
-    DriveState.QUICK_STOP_ACTIVE,
-    DriveState.FAULT_REACTION_ACTIVE,
-)
 
 
 @dataclass(frozen=True)
@@ -123,7 +117,7 @@ def _confirmed(
         return Stopped(name, False, str(problem))
     try:
         node, servo = _node(spec, winch, buses)
-        return _confirm(name, node, servo, problem, clock)
+        return _confirm(name, node, servo, clock)
     except WinchkitError as error:
         return Stopped(name, False, str(problem or error))
 
@@ -131,28 +125,16 @@ def _confirmed(
 def _node(
     spec: BenchSpec, winch: WinchWiring, buses: dict[str, CanBus]
 ) -> tuple[SdoNode, ServoSpec]:
-    from winchkit import catalog
+    from winchkit.bench.cells.instruments import device_of, eds_of
     from winchkit.drivers.can.canopen.node import SdoNode
-    from winchkit.schema.read import read_device
 
     ref = winch.servo
-    device = read_device(catalog.find("devices", ref.device, spec.path or None))
+    device = device_of(spec, ref)
     assert device.servo is not None, "the reader has checked it"
-    eds = Path(device.path).parent / device.servo.eds
-    return SdoNode(buses[ref.bus], ref.node or 1, eds), device.servo
+    return SdoNode(buses[ref.bus], ref.node or 1, eds_of(device)), device.servo
 
 
-def _tell(node: SdoNode) -> WinchkitError | None:
-    try:
-        node.write(0x6040, 0, QUICK_STOP)
-    except ConnectionLost as error:
-        return error
-    return None
-
-
-def _confirm(
-    winch: str, node: SdoNode, servo: ServoSpec, problem: WinchkitError | None, clock: Clock
-) -> Stopped:
+def _confirm(winch: str, node: SdoNode, servo: ServoSpec, clock: Clock) -> Stopped:
     """Ask until the drive is disabled or stands still in quick stop."""
     from winchkit.drivers.can.cia402.standstill import PolledStandstill
 
@@ -160,15 +142,13 @@ def _confirm(
     state = DriveState.UNKNOWN
     standstill: PolledStandstill | None = None
     while clock.now() < deadline:
-        try:
-            state = state_of(node.read(0x6041))
-            standstill = standstill or PolledStandstill(node, servo, clock)
-            at_rest = standstill.poll() and state is DriveState.QUICK_STOP_ACTIVE
-        except ConnectionLost as error:
-            return Stopped(winch, False, str(problem or error))
-        if at_rest or (state not in _MOVING and state is not DriveState.UNKNOWN):
+        state = state_of(node.read(0x6041))
+        standstill = standstill or PolledStandstill(node, servo, clock)
+        at_rest = standstill.poll() and state is DriveState.QUICK_STOP_ACTIVE
+        if at_rest or (state not in POWERED and state is not DriveState.UNKNOWN):
             return Stopped(winch, True, f"{state}, at rest" if at_rest else str(state))
         if state is DriveState.OPERATION_ENABLED:
-            _tell(node)
+            with suppress(ConnectionLost):  # the next read says what is wrong
+                node.write(0x6040, 0, QUICK_STOP)
         clock.sleep(_POLL)
     return Stopped(winch, False, f"still {state} after {_STOP_TIME:g} s")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -83,10 +82,7 @@ class Wired:
         return () if pid is None else (pid,)
 
     def disarm(self) -> None:
-        """Switch off the host watchdog of the drives that are at rest.
-
-        Any other keeps its watchdog, which stops it.
-        """
+        """Switch off the host watchdog of drives at rest; that of any other stops it."""
         for name, axis in self.axes.items():
             if self.loop.winches[name].controller.phase is Phase.DISABLED:
                 with suppress(ConnectionLost):
@@ -103,11 +99,7 @@ def wire(
     separate: bool = False,
     tell: Tell = to_stderr,
 ) -> Wired:
-    """Open all buses and lines; ``stack`` closes them. ``tell`` takes lines on a long set-up.
-
-    ``separate`` has the lines that are not CAN served by a process of their own, where the clock is
-    the machine's.
-    """
+    """Open all buses and lines; ``separate``: a process of its own for those that are not CAN."""
     from winchkit.effects import load_catalogue, terms_of
     from winchkit.estimation.cable_state import CableEstimator
 
@@ -260,7 +252,7 @@ def _tell_notes(
     notes += [note for axis in axes.values() if axis.drive for note in axis.drive.notes]
     notes += [note for bus in buses.values() if (note := bus.foreign_sync)]
     for note in notes:
-        sys.stderr.write(f"{note}\n")
+        to_stderr(note)
 
 
 def _weight(winch: WinchWiring) -> float | None:
@@ -273,10 +265,8 @@ def _frozen_cell(spec: BenchSpec, winch: WinchWiring) -> FrozenCell | None:
     if winch.cell is None:
         return None
     device = device_of(spec, winch.cell)
-    table = device.modbus or device.stream or device.process
-    if table is None:
-        return None
-    return FrozenCell(table.rate, correlation=table.filter_delay)
+    table = device.instrument
+    return None if table is None else FrozenCell(table.rate, correlation=table.filter_delay)
 
 
 def _moving(axis: Cia402Axis, cable: CableMap) -> Callable[[], bool]:

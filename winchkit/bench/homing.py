@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
+from contextlib import suppress
 
 from winchkit.bench.control.homing_motion import HomingMotion, HomingRequest
 from winchkit.bench.control.snapshot import Direction
@@ -141,11 +142,8 @@ def _run(
 
 def _prepare(axis: Cia402Axis, specs: list[HomingSpec]) -> None:
     """Prepare the first of these homings that the drive takes."""
-    *others, last = specs
-    for spec in others:
-        try:
+    for spec in specs[:-1]:
+        with suppress(DeviceRefused):
             axis.prepare_homing(spec)
-        except DeviceRefused:
-            continue
-        return
-    axis.prepare_homing(last)
+            return
+    axis.prepare_homing(specs[-1])

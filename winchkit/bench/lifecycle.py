@@ -36,10 +36,7 @@ _RESET_TIME = 2.0
 
 @contextmanager
 def stopped_after(stop: Callable[[], None]) -> Iterator[None]:
-    """Call ``stop`` at the end of the block; an error of the block is raised, not that of the stop.
-
-    A drive that is dead does not come to rest either: the first error has the cause.
-    """
+    """Call ``stop`` at the end of the block; an error of the block, the cause, comes first."""
     try:
         yield
     except BaseException:
@@ -91,10 +88,7 @@ def await_rest(
     *,
     unless: Callable[[str], bool] = lambda _name: False,
 ) -> None:
-    """Return when these winches are disabled and stand still; raises MotionError if not.
-
-    Those of which ``unless`` is true are not waited for.
-    """
+    """Return when these winches, less ``unless``, are disabled at rest; raises MotionError."""
     deadline = clock.now() + _REST_TIME
     controllers = {name: loop.winches[name].controller for name in names}
     await_cycles(loop, clock, 2)

@@ -28,10 +28,7 @@ _LOOK = 0.01
 
 
 def digest_of(spec: BenchSpec) -> str:
-    """SHA-1 of the bench file and of every file that it names: a changed one changes it.
-
-    These are profiles, device files, EDS, calibrations and effects; a missing one counts as empty.
-    """
+    """SHA-1 of the bench file and of every file that it names; a missing one counts as empty."""
     absolute = replace(spec, path=os.path.abspath(spec.path), latch_file="")
     digest = hashlib.sha1(repr(absolute).encode(), usedforsecurity=False)
     for file in dict.fromkeys(_files_of(spec)):

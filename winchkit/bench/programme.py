@@ -103,10 +103,7 @@ def earlier_runs(programme: Programme, folder: str | Path, suffix: str = ".csv")
 
 
 def _parts(steps: list[tuple[int, ProgrammeStep]]) -> list[list[tuple[int, ProgrammeStep]]]:
-    """Steps cut where a question follows a motion: a question begins a new run.
-
-    One about the load and the temperature that were asked for last is none, and is left out.
-    """
+    """Steps cut where a question follows a motion; one about what is known is left out."""
     parts: list[list[tuple[int, ProgrammeStep]]] = []
     hanging: float | None = None
     warm: float | None = None

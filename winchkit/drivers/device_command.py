@@ -60,11 +60,7 @@ async def confirm(
     sent: float,
     clock: Clock,
 ) -> None:
-    """Wait for a reading whose status says that a command sent at ``sent`` is executed.
-
-    ``has`` says whether the newest status has a meaning. Raises DeviceRefused where no status says
-    so in time.
-    """
+    """Wait for a status of after ``sent`` that the command is executed; raises DeviceRefused."""
     if command.comes is None and command.goes is None:
         return
     while clock.now() < sent + command.within:

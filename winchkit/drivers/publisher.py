@@ -13,10 +13,7 @@ from winchkit.drivers.reading import InstrumentReading, Quality
 
 @dataclass(frozen=True, slots=True)
 class HostScale:
-    """True value from the indicated one: c0 + c1 x + c2 x^2 ..., less the tare. SI.
-
-    Zero and tare of the device are in the device, independent of both.
-    """
+    """True value from the indicated one, SI: c0 + c1 x + c2 x² ..., less the host's own tare."""
 
     coefficients: tuple[float, ...] = (0.0, 1.0)
     tare: float = 0.0
@@ -29,10 +26,7 @@ class HostScale:
         return value
 
     def indicated(self, calibrated: float) -> float:
-        """Indication of the device for a true value; the inverse of :meth:`calibrated`.
-
-        Of the two a parabola has, the one on its rising side is meant.
-        """
+        """Inverse of :meth:`calibrated`; of the two of a parabola the one on its rising side."""
         c0, c1, *rest = self.coefficients
         c2 = rest[0] if rest else 0.0
         root = math.sqrt(max(0.0, c1 * c1 - 4 * c2 * (c0 - calibrated)))
@@ -160,10 +154,7 @@ class Publisher:
     def publish(
         self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
     ) -> InstrumentReading:
-        """Make a reading of what the device says (SI), judge it and publish it to the listeners.
-
-        Without a value (NaN) or with a flag that makes it unusable it is NaN.
-        """
+        """Judge what the device says (SI), publish it as a reading; NaN without a usable value."""
         before = self.latest
         if before is not None and counts == before.raw:
             quality |= Quality.DUPLICATE

@@ -8,6 +8,8 @@ from math import inf
 from statistics import median
 from typing import Protocol, TypeVar
 
+from winchkit.drivers.reading import Sensor
+
 QUICK_RETRIES = 2
 """Failures in a row after which an instrument is polled at once again; a further one makes it rare,
 so that others on the line keep their rates."""
@@ -44,10 +46,7 @@ P = TypeVar("P", bound=Polled)
 
 
 def next_of(instruments: Sequence[P], now: float, due: Callable[[P], float]) -> P:
-    """Instrument to poll next: of those that are due the one that has waited longest.
-
-    On a fully used line the rates are then those of :func:`fair_rates`.
-    """
+    """Of the instruments that are due the one that has waited longest, as for fair rates."""
     waiting = [item for item in instruments if due(item) <= now]
     if waiting:
         return min(waiting, key=lambda item: item.asked)
@@ -60,10 +59,7 @@ class LineShare:
     def __init__(
         self, wanted: Sequence[float], times: Sequence[float], least: float = _TICK
     ) -> None:
-        """Rates (1/s) that are ``wanted``, and the times (s) that a reading is likely to take.
-
-        ``least`` is the shortest time (s) that is reckoned with, however fast the answers are.
-        """
+        """Take wanted rates (1/s), likely times (s) of a reading, and the shortest time (s)."""
         self._wanted, self._least = tuple(wanted), least
         self._times = [max(time, least) for time in times]
         self._seen = [deque[float](maxlen=_WATCHED) for _ in times]
@@ -101,12 +97,26 @@ class LineShare:
         return self._times[index]
 
 
-def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:
-    """Rates (1/s) for instruments on one line, each of which takes ``times`` s for a reading.
+class SharedLine:
+    """A line that shares its time out among its instruments."""
 
-    Each gets the rate that it wants, or the same as all others that do not get theirs, so that the
-    line is fully used: the max-min fair share.
-    """
+    sensors: Sequence[Sensor]
+    _share: LineShare
+
+    def room_for(self, sensor: Sensor) -> float:
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
+        return self._share.room_for(self._place(sensor))
+
+    def time_of(self, sensor: Sensor) -> float:
+        """How long a reading of an instrument keeps the line busy, s."""
+        return self._share.time_of(self._place(sensor))
+
+    def _place(self, sensor: Sensor) -> int:
+        return next(k for k, item in enumerate(self.sensors) if item is sensor)
+
+
+def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:
+    """Max-min fair rates (1/s) of instruments on one line that take ``times`` s for a reading."""
     rates = [0.0] * len(wanted)
     free, left = _USE, sorted(range(len(wanted)), key=lambda k: wanted[k])
     while left:

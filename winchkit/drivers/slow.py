@@ -65,10 +65,7 @@ class SlowDevices:
             raise self._failure
 
     def command(self, sensor: Sensor, name: str) -> None:
-        """Send a command to an instrument between two readings and wait for its answer.
-
-        Raises NoReply, DeviceRefused, ConnectionLost, NotPermitted.
-        """
+        """Send a command between two readings and wait for its answer; raises ConnectionLost."""
         self._wait(self._line_of[id(sensor)].command(sensor, name), sensor)
 
     def identify(self, sensor: Sensor) -> dict[str, float]:

@@ -36,10 +36,7 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
 
 
 def programme_path(name: str) -> Path:
-    """Path of a motion programme: a file, or one shipped beside the simulated benches.
-
-    Raises FileError with the shipped ones.
-    """
+    """Path of a motion programme: a file, or one shipped beside the benches; raises FileError."""
     for path in (Path(name), folder("sim") / f"{name}.toml"):
         if path.is_file():
             return path
@@ -120,10 +117,7 @@ def listed_benches() -> list[ListedBench]:
 
 
 def choose_bench(seed: int) -> SimBench:
-    """The demonstration's bench for a seed, which determines the hidden effect and its size.
-
-    Consecutive seeds give all benches in turn; sizes are 0.8 to 1.3 times the declared ones.
-    """
+    """The demonstration's bench for a seed, all in turn; 0.8 to 1.3 times the declared sizes."""
     from winchkit.schema.read import read_simbench
 
     known = demo_names()

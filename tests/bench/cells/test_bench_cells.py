@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from waiting import until
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.remote.client import attach
@@ -72,10 +73,7 @@ def test_every_cell_command_works_at_the_owner(bench: Bench, wiring: Path) -> No
 
 def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -> None:
     bench.winch["A"].move_by(wind_in=1.5, speed=0.1, wait=False)
-    end = time.monotonic() + 10
-    while abs(bench.winch["A"].snapshot.cable_speed) < 0.02:
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    until(lambda: abs(bench.winch["A"].snapshot.cable_speed) >= 0.02)
     for words in (["zero"], ["tare"], ["tare", "--device"], ["store", "--yes"]):
         assert bench.winch["A"].moving
         failed = run(*words, "-b", wiring, error=NotPermitted)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,12 +9,6 @@ import pytest
 import winchkit
 from served import Served
 from winchkit.errors import NotPermitted, UsageError
-
-
-@pytest.fixture
-def cell() -> Iterator[Served]:
-    with Served("laumas-tlb") as served:
-        yield served
 
 
 def test_information_and_rate(cell: Served, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,12 +12,6 @@ from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.read import read_bench, read_tares
-
-
-@pytest.fixture
-def cell() -> Iterator[Served]:
-    with Served("laumas-tlb") as served:
-        yield served
 
 
 @pytest.fixture

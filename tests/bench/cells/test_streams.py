@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from waiting import until
 from winchkit import open_bench
 from winchkit.catalog import find
 from winchkit.errors import UsageError
@@ -23,7 +23,6 @@ pytestmark = [
     pytest.mark.realtime,
     pytest.mark.skipif(sys.platform == "win32", reason="needs pseudo-terminals"),
 ]
-PATIENCE = 20.0
 
 
 @pytest.fixture(scope="module")
@@ -32,29 +31,20 @@ def live() -> Iterator[LiveBench]:
         yield running
 
 
-def comes(condition: Callable[[], bool]) -> bool:
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.02)
-    return False
-
-
 def test_a_serial_cell_measures_fails_and_comes_back(live: LiveBench, tmp_path: Path) -> None:
     with open_bench(live.write_bench_file(tmp_path / "bench.toml")) as bench:
         winch = bench.winch["A"]
-        assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
+        until(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
         winch.move_by(wind_in=0.1)
-        assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
+        until(lambda: abs(winch.tension - 10 * 9.80665) < 5.0)
         live.inject("A.cell", "overload")
-        assert comes(lambda: math.isnan(winch.tension))
+        until(lambda: math.isnan(winch.tension))
         live.inject("A.cell", "recover")
-        assert comes(lambda: math.isfinite(winch.tension))
+        until(lambda: math.isfinite(winch.tension))
         live.inject("A.cell", "unplug")
-        assert comes(lambda: math.isnan(winch.tension))
+        until(lambda: math.isnan(winch.tension))
         live.inject("A.cell", "replug")
-        assert comes(lambda: math.isfinite(winch.tension))
+        until(lambda: math.isfinite(winch.tension))
 
 
 def test_a_cell_without_a_tare_of_its_own_is_tared_by_the_host(
@@ -68,7 +58,7 @@ def test_a_cell_without_a_tare_of_its_own_is_tared_by_the_host(
         assert reading is not None
         assert reading.gross == pytest.approx(10 * 9.80665, abs=10.0)
     with open_bench(wiring) as bench:
-        assert comes(lambda: abs(bench.winch["A"].tension) < 5.0), "it lasts"
+        until(lambda: abs(bench.winch["A"].tension) < 5.0)
         assert bench.cells.sensors["A.cell"].tared is not True
 
 
@@ -82,14 +72,14 @@ def test_two_cells_share_a_line_by_their_addresses(tmp_path: Path) -> None:
         path = running.write_bench_file(tmp_path / "bench.toml")
         with open_bench(path) as bench:
             winch = bench.winch["A"]
-            assert comes(lambda: abs(winch.tension - 10 * 9.80665) < 0.5)
+            until(lambda: abs(winch.tension - 10 * 9.80665) < 0.5)
             load = winch.sensors["load"]
             assert load.latest is not None
             assert load.latest.value == pytest.approx(10 * 9.80665, abs=0.5)
             running.inject("A.cell", "silence")
-            assert comes(lambda: math.isnan(winch.snapshot.tension))
+            until(lambda: math.isnan(winch.snapshot.tension))
             before = load.counters.readings
-            assert comes(lambda: load.counters.readings > before)
+            until(lambda: load.counters.readings > before)
 
 
 def test_its_faults_are_its_own(live: LiveBench) -> None:

@@ -2,47 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
 
 from winchkit import catalog, open_bench
-from winchkit.bench.bench import Bench
 from winchkit.errors import LimitTripped
 from winchkit.schema.read import read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
+from winchkit.testing.plugin import SimBenchFixture
 
 
-@pytest.fixture
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture
-def live(clock: SimulatedClock) -> Iterator[LiveBench]:
-    declared = read_simbench(catalog.find("sim", "spiral-bench"))
-    with LiveBench(declared, simulated_time=clock) as running:
-        yield running
-
-
-@pytest.fixture
-def bench(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
-    with open_bench(live.bench_spec, clock) as opened:
-        yield opened
-
-
-def test_a_lost_map_leaves_no_winch_running(
-    bench: Bench, live: LiveBench, clock: SimulatedClock
-) -> None:
-    winch, truth = bench.winch["A"], live.winches["A"].plant
+def test_a_lost_map_leaves_no_winch_running(sim_bench: SimBenchFixture) -> None:
+    sim = sim_bench("spiral-bench")
+    bench, clock = sim.bench, sim.clock
+    winch, truth = bench.winch["A"], sim.live.winches["A"].plant
     bench.on_cycle(lambda _snapshot: {"A": -0.1})
     deadline = clock.now() + 15
     while abs(truth.motor_velocity) < 1.0:
         assert clock.now() < deadline, "it did not move"
         clock.sleep(0.01)
-    live.inject("A.servo", "map lost")
+    sim.fault("A.servo", "map lost")
     lost = clock.now()
     while abs(truth.motor_velocity) > 0.05:
         assert clock.now() < deadline, "it runs on"
@@ -59,10 +40,11 @@ def test_a_lost_map_leaves_no_winch_running(
     assert truth.cable_length - before == pytest.approx(0.1, abs=5e-3)
 
 
-def test_a_bench_of_a_long_cycle_closes_beside_a_dead_drive(clock: SimulatedClock) -> None:
+def test_a_bench_of_a_long_cycle_closes_beside_a_dead_drive() -> None:
     """Closing lets 50 cycles pass for the quick stop, 2 s of these: that is no loop that hangs."""
     declared = read_simbench(catalog.find("sim", "spiral-bench"))
     declared = replace(declared, bench=replace(declared.bench, cycle=0.04))
+    clock = SimulatedClock()
     with LiveBench(declared, simulated_time=clock) as live:
         with open_bench(live.bench_spec, clock) as bench:
             bench.winch["A"].move_by(pay_out=0.01, speed=0.1, hold=True)

@@ -6,13 +6,13 @@ import csv
 import itertools
 import os
 import signal
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from sim_process import served_bench, start
+from waiting import until
 
 pytestmark = [
     pytest.mark.realtime,
@@ -34,10 +34,7 @@ def rows_of(path: Path) -> list[list[str]]:
 
 
 def until_it_logs(path: Path) -> None:
-    deadline = time.monotonic() + 30
-    while not path.is_file() or len(rows_of(path)) < 10:
-        assert time.monotonic() < deadline, "no log began"
-        time.sleep(0.05)
+    until(lambda: path.is_file() and len(rows_of(path)) >= 10, 30.0, every=0.05)
 
 
 def test_a_second_log_onto_one_path_is_refused_whatever_it_calls_it(

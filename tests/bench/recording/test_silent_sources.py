@@ -13,6 +13,7 @@ import pytest
 
 from fed import CYCLE, EVERY, angle, recording
 from sim_process import first_line, start
+from waiting import until
 from winchkit.runs import read_run
 from winchkit.runs.info import info_of, summary_of
 from winchkit.runs.read import read_log
@@ -133,10 +134,7 @@ def test_the_command_reports_it_at_once_and_at_the_end(
     path = tmp_path / "lift.csv"
     words = ("log", "-b", "bench.toml", "-o", path, "--for", "4s", *strict)
     with start(*words, folder=tmp_path) as log:
-        deadline = time.monotonic() + 30
-        while not path.is_file() or len(path.read_text().split("\n")) < 60:
-            assert time.monotonic() < deadline, "no log began"
-            time.sleep(0.05)
+        until(lambda: path.is_file() and len(path.read_text().split("\n")) >= 60, 30.0)
         assert served.stdin is not None
         served.stdin.write("fault A.cell silence\n")
         served.stdin.flush()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -52,11 +51,6 @@ def velocity(rig: Rig) -> float:
     """Of the motor a moment after an order, rad/s."""
     rig.wait(SEEN)
     return rig.slaves[0].motor.velocity
-
-
-@pytest.fixture
-def rig(tmp_path: Path) -> Rig:
-    return Rig(tmp_path)
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from winchkit import catalog, open_bench
-from winchkit.bench.bench import Bench
+from winchkit import catalog
 from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
@@ -18,8 +17,7 @@ from winchkit.errors import NotPermitted, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
 from winchkit.schema.read import read_simbench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
+from winchkit.testing.opened import OpenedBench
 
 SPEED = 0.4
 
@@ -28,11 +26,10 @@ SPEED = 0.4
 class Rig:
     """A bench with a client in another process."""
 
-    bench: Bench
-    live: LiveBench
-    clock: SimulatedClock
+    sim: OpenedBench
 
     def __post_init__(self) -> None:
+        self.bench, self.clock = self.sim.bench, self.sim.clock
         self.client = Client("page 1", life=LifeSign())
         self.station = LocalStation(self.bench, self.client)
 
@@ -57,23 +54,18 @@ class Rig:
 
     @property
     def length(self) -> float:
-        return float(self.live.winches["A"].plant.cable_length)
+        return float(self.sim.live.winches["A"].plant.cable_length)
 
 
 @pytest.fixture(scope="module")
-def opened() -> Iterator[tuple[Bench, LiveBench, SimulatedClock]]:
-    declared = read_simbench(catalog.find("sim", "demo-adequate"))
-    clock = SimulatedClock()
-    with (
-        LiveBench(declared, simulated_time=clock) as live,
-        open_bench(live.bench_spec, clock) as bench,
-    ):
-        yield bench, live, clock
+def sim() -> Iterator[OpenedBench]:
+    with OpenedBench(read_simbench(catalog.find("sim", "demo-adequate"))) as opened:
+        yield opened
 
 
 @pytest.fixture
-def rig(opened: tuple[Bench, LiveBench, SimulatedClock]) -> Iterator[Rig]:
-    found = Rig(*opened)
+def rig(sim: OpenedBench) -> Iterator[Rig]:
+    found = Rig(sim)
     yield found
     found.station.close()
 

@@ -23,17 +23,6 @@ from winchkit.errors import UsageError, WinchkitError
 
 
 @pytest.fixture
-def rig(tmp_path: Path) -> Rig:
-    return Rig(tmp_path)
-
-
-@pytest.fixture
-def bench(rig: Rig) -> Iterator[Bench]:
-    with rig.opened() as opened:
-        yield opened
-
-
-@pytest.fixture
 def line(bench: Bench) -> Iterator[socket.socket]:
     connection = connect_to_owner(bench.spec)
     assert connection is not None

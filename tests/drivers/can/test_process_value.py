@@ -22,10 +22,11 @@ from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import NoReply, NotPermitted
-from winchkit.schema.bench import BusSpec
+from winchkit.schema.bench import BusSpec, DeviceRef, LimitSpec, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.instruments.process import SimulatedProcessInstrument as SimInstrument
+from winchkit.sim.live.instruments import instruments_of
 
 CLOCK = MonotonicClock()
 NODE = 5
@@ -181,3 +182,21 @@ def test_values_are_asked_for_where_none_are_sent(rig: Rig) -> None:
     finally:
         slow.close()
         bus.close()
+
+
+def test_a_simulated_thermometer_shows_kelvin(tmp_path: Path) -> None:
+    """A unit with another zero than SI's was shown without it."""
+    declared = catalog.find("devices", "generic-cia404")
+    process = device().process
+    assert process is not None
+    eds = declared.parent / process.eds
+    text = declared.read_text().replace('unit = "N"', 'unit = "K"')
+    warm = tmp_path / declared.name
+    warm.write_text(text.replace(f'"{process.eds}"', f'"{eds.as_posix()}"'))
+    ref = DeviceRef(str(warm), "can", node=NODE)
+    wiring = WinchWiring("", ref, LimitSpec(1.0), temperature=ref)
+    measured = {"temperature": lambda: 20.0}
+    thermometer = instruments_of(wiring, "", measured, lambda *_: None, now=0.0)["temperature"]
+    thermometer.convert()
+    thermometer.show(1.0)
+    assert thermometer.gross == pytest.approx(293.15)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import socket
 import sys
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from stream_rig import device
+from waiting import until
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.slow import SlowDevices
 from winchkit.drivers.stream.instrument import StreamInstrument
@@ -25,17 +25,6 @@ from winchkit.sim.instruments.stream import shown_by
 from winchkit.sim.instruments.stream_line import SimulatedStreamLine as SimLine
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs pseudo-terminals")
-PATIENCE = 20.0
-
-
-def comes(condition: Callable[[], bool]) -> bool:
-    """Whether something comes true before the patience ends."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return False
 
 
 class Served:
@@ -84,34 +73,34 @@ def served(request: pytest.FixtureRequest) -> Iterator[Served]:
 
 
 def test_readings_over_a_real_port_follow_the_truth(served: Served) -> None:
-    assert comes(lambda: served.reads(5.0))
+    until(lambda: served.reads(5.0))
     served.truth = 7.5
-    assert comes(lambda: served.reads(7.5))
-    assert comes(lambda: served.instrument.counters.readings > 5)
+    until(lambda: served.reads(7.5))
+    until(lambda: served.instrument.counters.readings > 5)
     assert served.instrument.counters.crc == 0
 
 
 def test_unplugging_is_noticed_and_ends_when_it_is_plugged_in(served: Served) -> None:
-    assert comes(lambda: served.reads(5.0))
+    until(lambda: served.reads(5.0))
     served.sim.inject("unplug")
-    assert comes(lambda: isinstance(served.instrument.problem, ConnectionLost))
+    until(lambda: isinstance(served.instrument.problem, ConnectionLost))
     served.truth = 8.0
     served.sim.inject("replug")
-    assert comes(lambda: served.reads(8.0))
+    until(lambda: served.reads(8.0))
     assert served.instrument.problem is None
     assert served.instrument.counters.reconnects >= 1
     served.sim.inject("unplug")
-    assert comes(lambda: isinstance(served.instrument.problem, ConnectionLost))
+    until(lambda: isinstance(served.instrument.problem, ConnectionLost))
     served.sim.inject("recover")
-    assert comes(lambda: served.instrument.problem is None)
+    until(lambda: served.instrument.problem is None)
 
 
 def test_a_refusal_comes_through_to_the_caller() -> None:
     served = Served("flintec-ldu")
     try:
-        assert comes(lambda: served.reads(5.0))
+        until(lambda: served.reads(5.0))
         served.slow.command(served.instrument, "tare")
-        assert comes(lambda: served.reads(0.0))
+        until(lambda: served.reads(0.0))
         served.sim.inject("refusal")
         with pytest.raises(DeviceRefused, match="answers 'ERR'"):
             served.slow.command(served.instrument, "tare")
@@ -125,7 +114,7 @@ def test_a_port_that_is_not_there_is_a_problem_with_its_name(tmp_path: Path) -> 
     spec = BusSpec("serial", port=str(tmp_path / "no-such-tty"))
     slow = SlowDevices([StreamLine("cells", spec, (one,), clock)])
     try:
-        assert comes(lambda: one.problem is not None)
+        until(lambda: one.problem is not None)
         assert "no-such-tty): cannot be opened" in str(one.problem)
         with pytest.raises(ConnectionLost, match="no-such-tty"):
             slow.command(one, "tare")
@@ -141,7 +130,7 @@ def test_a_port_may_be_a_url_and_comes_back_when_the_server_does() -> None:
         return one.latest is not None and one.latest.value == value
 
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(PATIENCE)
+        server.settimeout(20.0)
         clock = MonotonicClock()
         one = StreamInstrument("x", device("generic-line"), None, clock, rate=10.0, timeout=0.2)
         spec = BusSpec("serial", port=f"socket://127.0.0.1:{server.getsockname()[1]}")
@@ -150,21 +139,21 @@ def test_a_port_may_be_a_url_and_comes_back_when_the_server_does() -> None:
             for value in (1.5, 2.5):
                 peer, _ = server.accept()
                 with peer:
-                    assert comes(lambda: says(peer, value))  # noqa: B023 - done within the turn
+                    until(lambda: says(peer, value))  # noqa: B023 - done within the turn
             assert one.counters.reconnects >= 1
         finally:
             slow.close()
 
 
 def test_a_port_belongs_to_one_reader(served: Served) -> None:
-    assert comes(lambda: served.reads(5.0))
+    until(lambda: served.reads(5.0))
     clock = MonotonicClock()
     second = StreamInstrument("y", device("generic-line"), None, clock, rate=10.0, timeout=0.2)
     slow = SlowDevices(
         [StreamLine("again", BusSpec("serial", port=served.port.port), (second,), clock)]
     )
     try:
-        assert comes(lambda: second.problem is not None)
+        until(lambda: second.problem is not None)
         assert "no other program has it open" in str(second.problem)
     finally:
         slow.close()

@@ -72,13 +72,11 @@ def test_a_set_point_keeps_the_speed_that_it_was_taken_with() -> None:
     rig.write(0x6083, 0, 5_000_000)
     rig.write(0x6081, 0, 100_000)
     rig.enable(PP)
-    rig.write(0x607A, 0, 200_000)
-    rig.control(0x1F, 0x0F)
+    rig.set_point(200_000, 0x1F, 0x0F)
     rig.write(0x6081, 0, 300_000)
     rig.run(0.5)
     assert rig.shaft.motor_velocity == pytest.approx(100_000 * COUNT, rel=1e-6)
-    rig.write(0x607A, 0, 400_000)
-    rig.control(0x3F, 0x0F)
+    rig.set_point(400_000, 0x3F, 0x0F)
     rig.run(0.3)
     assert rig.shaft.motor_velocity == pytest.approx(300_000 * COUNT, rel=1e-6)
 
@@ -86,12 +84,10 @@ def test_a_set_point_keeps_the_speed_that_it_was_taken_with() -> None:
 def test_a_set_point_needs_a_new_edge() -> None:
     rig = Rig()
     rig.enable(PP)
-    rig.write(0x607A, 0, 10_000)
-    rig.control(0x1F)
+    rig.set_point(10_000, 0x1F)
     rig.run(2.0)
     assert rig.status & ACKNOWLEDGED
-    rig.write(0x607A, 0, 50_000)
-    rig.control(0x1F)
+    rig.set_point(50_000, 0x1F)
     rig.run(1.0)
     assert rig.read(0x6064) == 10_000
     rig.control(0x0F)
@@ -104,8 +100,7 @@ def test_a_set_point_needs_a_new_edge() -> None:
 def test_halt_interrupts_a_profile_and_its_end_goes_on() -> None:
     rig = Rig()
     rig.enable(PP)
-    rig.write(0x607A, 0, 500_000)
-    rig.control(0x1F, 0x0F)
+    rig.set_point(500_000, 0x1F, 0x0F)
     rig.run(0.4)
     rig.control(0x10F)
     rig.run(1.0)
@@ -121,8 +116,7 @@ def test_halt_interrupts_a_profile_and_its_end_goes_on() -> None:
 def test_relative_moves_add_up_even_while_one_is_under_way() -> None:
     rig = Rig()
     rig.enable(PP)
-    rig.write(0x607A, 0, 50_000)
-    rig.control(0x5F, 0x4F, 0x5F, 0x4F)
+    rig.set_point(50_000, 0x5F, 0x4F, 0x5F, 0x4F)
     rig.run(4.0)
     assert rig.read(0x6064) == 100_000
 
@@ -132,8 +126,7 @@ def test_a_profile_is_held_to_the_greatest_profile_speed() -> None:
     rig.write(0x6081, 0, 600_000)
     rig.write(0x607F, 0, 150_000)
     rig.enable(PP)
-    rig.write(0x607A, 0, 500_000)
-    rig.control(0x1F)
+    rig.set_point(500_000, 0x1F)
     fastest = 0.0
     for _ in range(500):
         rig.run(2e-3)

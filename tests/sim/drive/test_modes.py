@@ -161,13 +161,11 @@ def test_profile_position_keeps_one_set_point_in_reserve() -> None:
     rig = Rig()
     rig.enable(PP)
     for target in (100_000, 200_000):
-        rig.write(0x607A, 0, target)
-        rig.control(0x1F)
+        rig.set_point(target, 0x1F)
         assert rig.status & 0x1000
         rig.control(0x0F)
     assert rig.status & 0x1000, "the reserve is full"
-    rig.write(0x607A, 0, 900_000)
-    rig.control(0x1F, 0x0F)
+    rig.set_point(900_000, 0x1F, 0x0F)
     rig.run(3.0)
     assert rig.read(0x6064) == 200_000
 
@@ -175,15 +173,12 @@ def test_profile_position_keeps_one_set_point_in_reserve() -> None:
 def test_profile_position_at_once_and_relative() -> None:
     rig = Rig()
     rig.enable(PP)
-    rig.write(0x607A, 0, 400_000)
-    rig.control(0x1F, 0x0F)
+    rig.set_point(400_000, 0x1F, 0x0F)
     rig.run(0.3)
-    rig.write(0x607A, 0, -50_000)
-    rig.control(0x3F, 0x0F)
+    rig.set_point(-50_000, 0x3F, 0x0F)
     rig.run(3.0)
     assert rig.read(0x6064) == -50_000
-    rig.write(0x607A, 0, 30_000)
-    rig.control(0x5F, 0x0F)
+    rig.set_point(30_000, 0x5F, 0x0F)
     rig.run(3.0)
     assert rig.read(0x6064) == -20_000
 
@@ -195,8 +190,7 @@ def test_a_stuck_motor_is_a_following_error_in_position_modes() -> None:
     rig.enable(PP)
     rig.shaft.stuck = True
     rig.write(0x6081, 0, 500_000)
-    rig.write(0x607A, 0, 1_000_000)
-    rig.control(0x1F)
+    rig.set_point(1_000_000, 0x1F)
     start = rig.now
     while rig.drive.error_code == 0:
         rig.run(1e-3)

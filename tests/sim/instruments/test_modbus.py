@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,11 +11,11 @@ from hypothesis import strategies as st
 
 from winchkit.catalog import find
 from winchkit.errors import UsageError
-from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, ReadBlock
+from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, Order, ReadBlock, ValueType
 from winchkit.schema.read import read_device
 from winchkit.sim.instruments.modbus import ModbusInstrument, counts_of, encode, in_unit_of
 
-ORDERS = {"ABCD": "ABCD", "CDAB": "CDAB", "BADC": "BADC", "DCBA": "DCBA"}
+ORDERS: tuple[Order, ...] = ("ABCD", "CDAB", "BADC", "DCBA")
 
 
 def spec(name: str) -> ModbusSpec:
@@ -36,25 +35,21 @@ def in_order(order: str, sent: bytes) -> bytes:
     return bytes(by_letter[letter] for letter in sorted(by_letter))
 
 
-@given(st.sampled_from(list(ORDERS)), st.integers(-(2**31), 2**31 - 1))
-def test_whole_numbers_in_every_order(order: Any, value: int) -> None:
-    field = FieldSpec("x", 0, "i32", order)
+NUMBERS: dict[ValueType, tuple[str, st.SearchStrategy[float]]] = {
+    "i32": (">i", st.integers(-(2**31), 2**31 - 1)),
+    "i16": (">h", st.integers(-(2**15), 2**15 - 1)),
+    "f32": (">f", st.floats(width=32, allow_nan=False)),
+}
+
+
+@pytest.mark.parametrize("kind", NUMBERS)
+@given(data=st.data())
+def test_numbers_in_every_order(kind: ValueType, data: st.DataObject) -> None:
+    layout, numbers = NUMBERS[kind]
+    order, value = data.draw(st.sampled_from(ORDERS)), data.draw(numbers)
+    field = FieldSpec("x", 0, kind, order)
     sent = wire(encode(field, counts_of(field, value)[0]))
-    assert in_order(order, sent) == struct.pack(">i", value)
-
-
-@given(st.sampled_from(list(ORDERS)), st.integers(-(2**15), 2**15 - 1))
-def test_short_numbers_in_every_order(order: Any, value: int) -> None:
-    field = FieldSpec("x", 0, "i16", order)
-    sent = wire(encode(field, counts_of(field, value)[0]))
-    assert in_order(order, sent) == struct.pack(">h", value)
-
-
-@given(st.sampled_from(list(ORDERS)), st.floats(width=32, allow_nan=False))
-def test_floats_in_every_order(order: Any, value: float) -> None:
-    field = FieldSpec("x", 0, "f32", order)
-    sent = wire(encode(field, counts_of(field, value)[0]))
-    assert in_order(order, sent) == struct.pack(">f", value)
+    assert in_order(order, sent) == struct.pack(layout, value)
 
 
 @given(st.floats(-1e7, 1e7), st.floats(1e-4, 10.0))
@@ -70,7 +65,7 @@ def test_counts_are_the_nearest_of_the_scale(value: float, scale: float) -> None
     [("u16", -1.0, 0), ("u16", 7e4, 65535), ("i16", -4e4, -32768), ("u32", 5e9, 2**32 - 1)],
 )
 def test_a_value_beyond_the_type_is_clipped_and_reported(
-    kind: Any, value: float, counts: int
+    kind: ValueType, value: float, counts: int
 ) -> None:
     assert counts_of(FieldSpec("x", 0, kind), value) == (counts, True)
 

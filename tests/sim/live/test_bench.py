@@ -14,6 +14,7 @@ import canopen
 import pytest
 from pymodbus.client import ModbusTcpClient
 
+from waiting import until
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NotPermitted, UsageError
 from winchkit.schema.programme import ProgrammeStep
@@ -77,17 +78,9 @@ class Master:
 @pytest.fixture
 def master(live: LiveBench) -> Iterator[Master]:
     found = Master(live)
-    wait_for(lambda: live.winches["A"].drive.state == 0x40)
+    until(lambda: live.winches["A"].drive.state == 0x40)
     yield found
     found.close()
-
-
-def wait_for(condition: Any, limit: float = 10.0) -> None:
-    """Poll until it holds; a busy machine may take its time."""
-    end = time.monotonic() + limit
-    while not condition():
-        assert time.monotonic() < end, "it did not happen"
-        time.sleep(0.002)
 
 
 def test_the_written_wiring_is_the_one_in_use(live: LiveBench, tmp_path: Path) -> None:
@@ -116,12 +109,10 @@ def test_what_turns_the_motor_moves_the_cable_and_the_instruments(
     assert master.tension() == pytest.approx(98.07, abs=0.02)
     master.enable()
     master.node.sdo[0x60FF].raw = -500_000
-    wait_for(lambda: master.length() > before + 0.05)
+    until(lambda: master.length() > before + 0.05)
     master.node.sdo[0x60FF].raw = 0
-    wait_for(lambda: abs(live.winches["A"].plant.motor_velocity) < 1e-3)
-    wait_for(
-        lambda: master.length() == pytest.approx(live.winches["A"].plant.cable_length, abs=2e-5)
-    )
+    until(lambda: abs(live.winches["A"].plant.motor_velocity) < 1e-3)
+    until(lambda: master.length() == pytest.approx(live.winches["A"].plant.cable_length, abs=2e-5))
     turned = (master.node.sdo[0x6064].raw - angle) * COUNT
     paid_out = master.length() - before
     assert turned < 0
@@ -132,10 +123,10 @@ def test_what_turns_the_motor_moves_the_cable_and_the_instruments(
 
 def test_a_load_is_changed_at_rest_only(live: LiveBench, master: Master) -> None:
     live.answer(ProgrammeStep(ask="hang the 20 kg load", load_mass=20.0))
-    wait_for(lambda: master.tension() == pytest.approx(196.13, abs=0.02))
+    until(lambda: master.tension() == pytest.approx(196.13, abs=0.02))
     master.enable()
     master.node.sdo[0x60FF].raw = -300_000
-    wait_for(lambda: live.winches["A"].plant.motor_velocity < -10)
+    until(lambda: live.winches["A"].plant.motor_velocity < -10)
     with pytest.raises(NotPermitted, match=r"winch A: its motor turns at"):
         live.hang("A", 10.0)
     with pytest.raises(UsageError, match=r"no winch 'B'.*it has A"):
@@ -144,7 +135,7 @@ def test_a_load_is_changed_at_rest_only(live: LiveBench, master: Master) -> None
 
 def test_sync_brings_the_position_of_that_moment(live: LiveBench, master: Master) -> None:
     master.node.nmt.state = "OPERATIONAL"
-    wait_for(lambda: live.winches["A"].drive.nmt == 5)
+    until(lambda: live.winches["A"].drive.nmt == 5)
     bus = live.bench_spec.bus["can"]
     with can.Bus(interface=bus.interface, channel=bus.channel) as listener:
         listener.set_filters([{"can_id": 0x181, "can_mask": 0x7FF}])
@@ -157,7 +148,7 @@ def test_sync_brings_the_position_of_that_moment(live: LiveBench, master: Master
 def test_faults_of_the_declaration_happen_at_their_time(declared: SimBench) -> None:
     faults = (FaultSpec(0.05, "over-current", "A.servo"), FaultSpec(0.02, "silence", "A.cell"))
     with LiveBench(replace(declared, fault=faults)) as live:
-        wait_for(lambda: live.winches["A"].drive.state == 0x08)
+        until(lambda: live.winches["A"].drive.state == 0x08)
         assert live.winches["A"].drive.error_code == 0x2310
         assert "silence" in live.winches["A"].instruments["cell"].faults
 
@@ -260,7 +251,7 @@ def test_a_bus_that_dies_is_not_hidden(declared: SimBench, monkeypatch: pytest.M
     def run() -> None:
         with LiveBench(declared) as live:
             monkeypatch.setattr(live._ports["can"]._bus, "receive", unplugged)
-            wait_for(live._loops[0].done)
+            until(live._loops[0].done)
 
     with pytest.raises(ConnectionLost, match="cannot receive: unplugged"):
         run()

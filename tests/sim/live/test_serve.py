@@ -15,6 +15,7 @@ from pathlib import Path
 import can
 import pytest
 
+from waiting import until
 from winchkit import open_bench
 from winchkit.schema.read import read_bench
 from winchkit.sim.live.client import address_file, send
@@ -97,9 +98,7 @@ def test_a_served_robot_moves_its_platform_without_a_trip(tmp_path: Path) -> Non
         path.write_text(re.sub(r"(?m)^cycle = .*$", 'cycle = "16 ms"', text))
         assert path.read_text() != text
         with open_bench(path, realtime="try") as bench:
-            end = time.monotonic() + 5
-            while bench.snapshot.blocked and time.monotonic() < end:
-                time.sleep(0.05)
+            until(lambda: not bench.snapshot.blocked)
             before = bench.robot.coordinates()
             bench.robot.move(bench.robot.moved({"x": 0.02}, relative=True), 0.05)
             after = bench.robot.coordinates()

@@ -133,19 +133,24 @@ class Rig:
 
     def write(self, index: int, sub: int, value: int) -> None:
         """Write an object through canopen's client."""
-        variable = self.node.object_dictionary[index]
-        target = variable if sub == 0 and not hasattr(variable, "subindices") else variable[sub]
-        self.node.sdo.download(index, sub, target.encode_raw(value))
+        self.node.sdo.download(index, sub, self._variable(index, sub).encode_raw(value))
 
     def read(self, index: int, sub: int = 0) -> int:
         """Read an object through canopen's client."""
-        variable = self.node.object_dictionary[index]
-        target = variable if sub == 0 and not hasattr(variable, "subindices") else variable[sub]
-        return int(target.decode_raw(self.node.sdo.upload(index, sub)))
+        return int(self._variable(index, sub).decode_raw(self.node.sdo.upload(index, sub)))
+
+    def _variable(self, index: int, sub: int) -> Any:
+        found = self.node.object_dictionary[index]
+        return found if sub == 0 and not hasattr(found, "subindices") else found[sub]
 
     def control(self, *words: int) -> None:
         for word in words:
             self.write(0x6040, 0, word)
+
+    def set_point(self, target: int, *words: int) -> None:
+        """Write a target position, then control words."""
+        self.write(0x607A, 0, target)
+        self.control(*words)
 
     @property
     def status(self) -> int:

@@ -99,7 +99,7 @@ def test_a_log_counts_its_rows_and_cycles_and_objects_are_shown(
     residual = page.locator("#strips .strip").nth(1).locator(".last")
     until(page, lambda: "–" not in residual.inner_text() and residual.inner_text().endswith("N"))
     page.context.close()
-    log = tmp_path.parent / "work0" / name
+    log = bench.folder / name
     assert len(log.read_text(encoding="utf-8").splitlines()) > 20
     log.unlink()
 

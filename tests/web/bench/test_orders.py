@@ -183,6 +183,17 @@ def test_a_tare_asks_shows_gross_beside_net_and_is_undone(commanding: Commanding
     assert page.locator("#untare").is_hidden()
 
 
+def test_a_dialog_that_opens_as_another_closes_keeps_the_focus(commanding: Commanding) -> None:
+    page = commanding.page
+    focused = page.evaluate(
+        """async () => { for (const key of ["t", "Escape", "t"])
+        document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+        await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+        return document.activeElement.textContent; }"""
+    )
+    assert focused == "Tare winch A"
+
+
 def test_messages_repeat_end_and_are_above_a_dialog(commanding: Commanding) -> None:
     page = commanding.page
     banner = page.locator("#banner .alert")

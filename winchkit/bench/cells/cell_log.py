@@ -58,10 +58,7 @@ class CellStation(OwnedLog):
 
 @contextmanager
 def at_cell_station(spec: BenchSpec) -> Iterator[CellStation]:
-    """The instruments of a bench without winches, opened here.
-
-    Raises NotPermitted where another process owns it, FileError, ConnectionLost, UsageError.
-    """
+    """The instruments of a bench without winches, owned and opened here; raises NotPermitted."""
     if not spec.cells:
         raise UsageError(f"bench '{spec.name}' has winches; attach to it")
     with own_cells(spec, "log") as desk:

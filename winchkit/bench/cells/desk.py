@@ -81,10 +81,7 @@ class CellDesk:
         *,
         permit: Callable[[str], None] = lambda _name: None,
     ) -> None:
-        """Take open instruments, by winch and role.
-
-        ``permit`` raises where an instrument's zero or tare may not be changed now.
-        """
+        """Take open instruments; ``permit`` raises where a zero or tare may not be changed now."""
         self.spec, self.clock, self.lines, self.permit = spec, clock, lines, permit
         self.sensors: Mapping[str, Sensor] = {
             f"{winch}.{role}": sensor
@@ -166,10 +163,7 @@ class CellDesk:
         return sensor.latest
 
     def readings(self, name: str, duration: float) -> list[InstrumentReading]:
-        """Every reading of the next ``duration`` s, longer where they are few.
-
-        Raises what keeps them from coming.
-        """
+        """Every reading of the next ``duration`` s, longer where they are few; raises NoReply."""
         self.first_reading(name)
         sensor, taken = self.sensors[name], list[InstrumentReading]()
         end = self.clock.now() + duration

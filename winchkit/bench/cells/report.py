@@ -23,6 +23,7 @@ smaller ratio is no other setting."""
 def about(desk: CellDesk, name: str) -> dict[str, Any]:
     """Everything that is known of an instrument; raises what keeps it from answering."""
     ref, device = desk.ref(name), desk.device(name)
+    table = device.instrument
     reading = desk.first_reading(name)
     identity = desk.identify(name)
     calibration = calibration_of(desk.spec, ref)
@@ -45,7 +46,7 @@ def about(desk: CellDesk, name: str) -> dict[str, Any]:
         "timing": {
             "age": reading.t_receive - reading.t_sample,
             "uncertainty": reading.t_uncertainty,
-            "filter": _filter_delay(device),
+            "filter": 0.0 if table is None else float(table.filter_delay),
             "latency": reading.t_receive - reading.t_request,
         },
         "counters": counters_told(sensor.counters),
@@ -89,7 +90,7 @@ def rate_report(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
 def _limits(desk: CellDesk, name: str) -> tuple[dict[str, float], dict[str, Any], bool]:
     """Rates that bound an instrument's, time of a reading, and whether it sends by itself."""
     device, cap = desk.device(name), desk.ref(name).rate
-    table = device.modbus or device.stream or device.process
+    table = device.instrument
     assert table is not None, "every instrument has one of them"
     stream, process = device.stream, device.process
     if (stream and stream.mode == "continuous") or (process and process.tpdo):
@@ -124,13 +125,6 @@ def _advice(limit: str, measured: float, planned: float, *, by_itself: bool) -> 
     if limit.startswith("the line"):
         return "raise the baud rate, read fewer registers, or give the cell a line of its own"
     return ""
-
-
-def _filter_delay(device: DeviceSpec) -> float:
-    for table in (device.modbus, device.stream, device.process):
-        if table is not None:
-            return float(table.filter_delay)
-    return 0.0
 
 
 def _link_remarks(desk: CellDesk, name: str, device: DeviceSpec) -> list[str]:

@@ -74,11 +74,7 @@ def tares_now(desk: CellDesk, name: str) -> dict[str, Any]:
 
 
 def restore_tares(desk: CellDesk, name: str, before: Mapping[str, Any]) -> dict[str, Any]:
-    """Undo a tare: the tares of an instrument are again what :func:`tares_now` gave before it.
-
-    Raises NotPermitted in motion, and where the device itself had been tared: it keeps no earlier
-    tare.
-    """
+    """Restore the tares of :func:`tares_now`; raises NotPermitted where the device cannot."""
     desk.permit(name)
     if desk.device(name).commands.get("tare") is False:
         if before["device"]:
@@ -98,22 +94,8 @@ def restore_tares(desk: CellDesk, name: str, before: Mapping[str, Any]) -> dict[
     return {}
 
 
-def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Send the device its own tare; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "tare", duration)
-
-
-def clear_device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Let the device count gross again; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "gross", duration)
-
-
-def device_zero(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Send the device its own zero; raises NotPermitted, NoReply, DeviceRefused."""
-    return _by_device(desk, name, "zero", duration)
-
-
-def _by_device(desk: CellDesk, name: str, command: str, duration: float) -> dict[str, Any]:
+def by_device(desk: CellDesk, name: str, duration: float, *, command: str) -> dict[str, Any]:
+    """Send the device a volatile command; raises NotPermitted, NoReply, DeviceRefused."""
     desk.permit(name)
     before = steady(desk.readings(name, duration))
     desk.command(name, command)
@@ -157,10 +139,7 @@ _SETTLING = 3
 
 
 def await_device_tare(clock: Clock, winch: str, cell: Sensor) -> float:
-    """Wait for readings after the tare and make sure that the device took it; the tension, N.
-
-    Raises NoReply where it does not confirm.
-    """
+    """Wait for readings after the tare; returns the tension, N. Raises NoReply if unconfirmed."""
     sent, seen, deadline = clock.now(), 0, clock.now() + _WITHIN
     last = sent
     while clock.now() < deadline:

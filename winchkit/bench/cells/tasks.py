@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any, Protocol
 
 from winchkit.bench.cells.desk import CellDesk, full_name, indicated
 from winchkit.bench.cells.report import about, counters_told, rate_report
 from winchkit.bench.cells.tares import (
-    clear_device_tare,
+    by_device,
     clear_tare,
-    device_tare,
-    device_zero,
     host_tare,
     restore_tares,
     tares_now,
@@ -86,9 +85,9 @@ def _store(desk: CellDesk, name: str, command: str) -> dict[str, Any]:
 
 TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "about": about,
-    "clear device tare": clear_device_tare,
+    "clear device tare": partial(by_device, command="gross"),
     "clear tare": clear_tare,
-    "device tare": device_tare,
+    "device tare": partial(by_device, command="tare"),
     "host tare": host_tare,
     "identify": _identify,
     "indicated": _indicated,
@@ -97,6 +96,6 @@ TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "store": _store,
     "tares": tares_now,
     "watch": _watch,
-    "zero": device_zero,
+    "zero": partial(by_device, command="zero"),
 }
 """Each takes a desk, the full name of an instrument and numbers in SI, or what "tares" gave."""

@@ -25,10 +25,7 @@ class Dialogue(Protocol):
         """Show a text that needs no answer."""
 
     def ask(self, key: str, question: str, choices: tuple[str, ...] = ()) -> str:
-        """The answer to a question, one of ``choices`` where there are any.
-
-        ``key`` names the question in a file of answers.
-        """
+        """The answer to a question, one of ``choices``; ``key`` names it in a file of answers."""
 
 
 class StoppedDialogue:

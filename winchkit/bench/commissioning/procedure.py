@@ -12,7 +12,6 @@ import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from winchkit.arguments import path_of
@@ -41,6 +40,7 @@ from winchkit.bench.commissioning.record import (
 )
 from winchkit.bench.commissioning.trial import TrialResult, Trials
 from winchkit.bench.ownership import unless_stopped
+from winchkit.bench.recording.provenance import installed
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
@@ -70,11 +70,7 @@ _LIMITS = (
 
 
 def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> CommissioningRecord:
-    """Lead through every item and write the record beside the bench file; returns it.
-
-    Raises NotPermitted for what was not confirmed or did not stop, MotionError where a stop came
-    meanwhile, and every error of opening.
-    """
+    """Lead through every item and write the record; raises NotPermitted for an unconfirmed one."""
     with unless_stopped(spec, "commissioned: nothing was recorded; begin anew") as check:
         return _commission(spec, StoppedDialogue(dialogue, check), clock)
 
@@ -367,13 +363,8 @@ def _now() -> str:
 
 
 def _software() -> Mapping[str, str]:
-    found = {"winchkit": __version__, "python": platform.python_version()}
-    for name in _LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    own = {"winchkit": __version__, "python": platform.python_version()}
+    return {**own, **installed(_LIBRARIES)}
 
 
 def commission(bench: str | Path, answers: str | Path | None = None) -> CommissioningRecord:

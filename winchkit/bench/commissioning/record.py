@@ -243,10 +243,7 @@ def require_commissioned(spec: BenchSpec, drives: Mapping[str, Cia402Axis]) -> N
 
 
 def trust_record(spec: BenchSpec, axes: Mapping[str, Cia402Axis]) -> None:
-    """Give the axes what commissioning saw of these very drives, where the record still holds.
-
-    Raises NoReply, DeviceRefused.
-    """
+    """Give the axes what commissioning saw of these very drives, where the record still holds."""
     try:
         record = read_record(spec.record_file) if spec.path else None
     except FileError:

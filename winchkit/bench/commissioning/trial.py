@@ -9,15 +9,16 @@ quick stop.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Self
 
 from winchkit.bench.control.cable import CableMap
+from winchkit.bench.control.controller import ENABLE_TIME
 from winchkit.bench.hardware import Wired, wire
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
-from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtCommand, NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import (
@@ -25,6 +26,7 @@ from winchkit.drivers.can.cia402.state_machine import (
     QUICK_STOP,
     DriveState,
     RequestedState,
+    has_left,
     state_of,
 )
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
@@ -33,8 +35,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import ConnectionLost, MotionError, NoReply, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
-_ENABLE_TIME = 2.0
-"""s: drives take some tenths, and with a brake to open about one."""
 _SETTLE_TIME = 0.3
 """s: oscillation at rest after enabling has decayed before a trial."""
 _MOVE_TIME = 0.8
@@ -56,8 +56,6 @@ _POLL = 0.002
 """s: resolution of a measured reaction, 2 % of the shortest limit."""
 _REPLY_TIME = 0.1
 """Within which a drive has answered an SDO request that needs no ramp, s."""
-_PRE_OPERATIONAL = 0x80
-"""NMT command specifier "enter pre-operational" (CiA 301)."""
 _HALF = 1 << 31
 """Half the range of 6064h (INTEGER32), past which its counts wrap."""
 
@@ -80,10 +78,7 @@ class Trials:
     """A bench that is wired for trials; a context manager."""
 
     def __init__(self, spec: BenchSpec, clock: Clock) -> None:
-        """Wire a bench that the caller owns: drives disabled, each mechanism proved so.
-
-        Raises what opening a bench raises.
-        """
+        """Wire a bench that the caller owns: drives disabled, each mechanism proved so."""
         self.spec, self._clock = spec, clock
         with ExitStack() as stack:
             latch = LatchFile(spec.latch_file)
@@ -111,7 +106,7 @@ class Trials:
             if kind is None:
                 self._keep_positions()
             for axis in self.axes.values():
-                with _frames_lost():
+                with suppress(ConnectionLost):
                     axis.disarm()
 
     def _keep_positions(self) -> None:
@@ -134,7 +129,7 @@ class Trials:
             # Where any frame is a life sign the drive is not asked before its time is over.
             blind = limit + _TIMEOUT / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
             state, after = self._left(axis, start, blind, timeout)
-            stopped = _has_left(state)
+            stopped = has_left(state)
             if stopped:
                 self._await_rest(axis)
             travel = self._travel(name, axis, angle)
@@ -155,10 +150,10 @@ class Trials:
             axis.stop_by_nmt()
             self._run(axis, 0.0, _NMT_TIME, name)
             # Only a state with SDO can be asked; RPDOs are not processed in it.
-            axis.objects.bus.nmt(_PRE_OPERATIONAL, axis.objects.node)
+            axis.objects.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, axis.objects.node)
             state = state_of(axis.objects.read(0x6041))
             after = self._clock.now() - start
-        return TrialResult(_has_left(state), after, str(state))
+        return TrialResult(has_left(state), after, str(state))
 
     def brake(self, name: str) -> TrialResult:
         """Enable the drive at rest, disable it, and see whether the cable moves after that."""
@@ -170,7 +165,7 @@ class Trials:
                 self._cycle(axis, RequestedState.DISABLE)
             travel = self._travel(name, axis, angle)
             state = _asked(axis)
-        return TrialResult(_has_left(state), _BRAKE_TIME, str(state), travel)
+        return TrialResult(has_left(state), _BRAKE_TIME, str(state), travel)
 
     @contextmanager
     def _ended(self, name: str) -> Iterator[Cia402Axis]:
@@ -185,7 +180,7 @@ class Trials:
         try:
             yield axis
         except BaseException:
-            with _frames_lost():
+            with suppress(ConnectionLost):  # the later steps are still necessary
                 axis.emergency_stop(sdo=True)
                 self._wired_syncs()
             # The reply to the stop by SDO is not for the confirmed client.
@@ -208,12 +203,12 @@ class Trials:
         axis = self.axes[name]
         node = axis.objects
         # A drive that stopped (1029h:1 = 2, NMT stopped) answers SDO only when pre-operational.
-        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         if state_of(node.read(0x6041)) is DriveState.OPERATION_ENABLED:
             node.write(0x6040, 0, QUICK_STOP)
         self._await_rest(axis)
         for one in self.axes.values():
-            one.objects.bus.nmt(_PRE_OPERATIONAL, one.objects.node)
+            one.objects.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, one.objects.node)
             one.objects.write(0x6040, 0, DISABLE_VOLTAGE)
             bring_back(one.objects, self._clock, clears=True)
             one.commission()
@@ -222,12 +217,12 @@ class Trials:
         self._keep(name, kept and replace(kept, count=node.read(0x6064)))
 
     def _enable(self, axis: Cia402Axis) -> None:
-        deadline = self._clock.now() + _ENABLE_TIME
+        deadline = self._clock.now() + ENABLE_TIME
         while axis.state is not DriveState.OPERATION_ENABLED:
             self._cycle(axis, RequestedState.ENABLE)
             if self._clock.now() > deadline:
                 raise NotPermitted(
-                    f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after the command to "
+                    f"{axis.name}: still {axis.state} {ENABLE_TIME:g} s after the command to "
                     f"enable: {axis.fault_text}; look at its enable input, supply and errors"
                 )
         self._hold = _angle(axis)
@@ -297,7 +292,7 @@ class Trials:
         while True:
             state = _asked(axis)
             after = self._clock.now() - start
-            if _has_left(state) or after > timeout:
+            if has_left(state) or after > timeout:
                 return state, after
             self._clock.sleep(_POLL)
 
@@ -332,18 +327,13 @@ def _timeout(mechanism: Mechanism) -> float:
     return _HARDWARE_TIMEOUT if nothing else mechanism.limit + _TIMEOUT
 
 
-def _has_left(state: DriveState) -> bool:
-    """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
-    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
-
-
 def _asked(axis: Cia402Axis) -> DriveState:
     """Power state by SDO; a drive whose network state is stopped has to leave that first."""
     node = axis.objects
     try:
         return state_of(node.read(0x6041))
     except NoReply:
-        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         return state_of(node.read(0x6041))
 
 
@@ -352,12 +342,3 @@ def _angle(axis: Cia402Axis) -> float:
     if feedback is None:
         raise NotPermitted(f"{axis.name}: sends no PDOs on SYNC; check its PDO mapping")
     return feedback.angle
-
-
-@contextmanager
-def _frames_lost() -> Iterator[None]:
-    """Continue where a frame cannot be sent: the later steps are still necessary."""
-    try:
-        yield
-    except ConnectionLost:
-        return

@@ -22,9 +22,8 @@ from winchkit.bench.control.observation import (
     WinchInput,
 )
 from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.control.tension_control import SLACK_TIME
 
-_SLACK_TIME = 0.2
-"""A load that swings relieves its cable for less, s."""
 _LENGTH_TOLERANCE = 5e-3
 """Overshoot of a position loop at a length limit, m."""
 _SPEED_TOLERANCE = 1.2
@@ -455,7 +454,7 @@ CONDITIONS: tuple[Condition, ...] = (
             "only winding in is allowed until it rises"
         ),
         blocks=Direction.PAY_OUT,
-        debounce=_SLACK_TIME,
+        debounce=SLACK_TIME,
         needs="tension_slack",
     ),
     Condition(

@@ -22,11 +22,17 @@ from winchkit.bench.control.stop_escalation import StopEscalation, StopEvidence,
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, DriveState, RequestedState
+from winchkit.drivers.can.cia402.state_machine import (
+    ENABLE_OPERATION,
+    POWERED,
+    DriveState,
+    RequestedState,
+    has_left,
+)
 from winchkit.schema.bench import LimitSpec
 
-_ENABLE_TIME = 2.0
-"""s, as in the trials of a commissioning: drives take some tenths, and about one with a brake."""
+ENABLE_TIME = 2.0
+"""s: drives take some tenths, and with a brake to open about one."""
 _GATE_TIME = 5.0
 """Time for which an enabled drive waits for others that start with it, s."""
 _RESET_TIME = 1.0
@@ -56,11 +62,6 @@ _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = DriveState.OPERATION_ENABLED
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
-_ENABLED = (
-    DriveState.OPERATION_ENABLED,
-    DriveState.QUICK_STOP_ACTIVE,
-    DriveState.FAULT_REACTION_ACTIVE,
-)
 
 
 @dataclass(frozen=True)
@@ -76,11 +77,7 @@ class _Order:
 
 
 class Controller:
-    """Phases from disabled over moving back to disabled.
-
-    ``begin``, ``run_down`` and ``stop`` may be called from any thread; they take effect in the
-    next ``step``.
-    """
+    """Phases from disabled over moving back; what a thread orders takes effect in the next step."""
 
     def __init__(self, axis: Cia402Axis, cable: CableMap, limits: LimitSpec) -> None:
         self.axis = axis
@@ -126,10 +123,7 @@ class Controller:
         return "" if reported else self.failure
 
     def begin(self, source: MotionSource, gate: StartGate | None = None) -> None:
-        """Start a source, enabling the drive first where needed; replaces the one before.
-
-        With a ``gate`` it waits, enabled and holding its place, until the gate opens.
-        """
+        """Start a source, enabling the drive first where needed; it waits enabled for the gate."""
         with self._lock:
             self.done = self.stopped = False
             self.failure = self.reason = ""
@@ -173,10 +167,7 @@ class Controller:
         return self.phase in _FOLLOWING and not self.axis.moves_alone
 
     def way(self, angle: float, arm: float) -> tuple[float, float]:
-        """Cable commanded and moved since the source began, in m, positive wound in.
-
-        ``angle`` is that of the motor (rad), ``arm`` in m/rad.
-        """
+        """Cable commanded and moved since the source began, m, positive wound in; arm in m/rad."""
         return (self._angle - self._origin) * arm, (angle - self._origin) * arm
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
@@ -196,10 +187,7 @@ class Controller:
         return words
 
     def step(self, now: float, time: float, sync: int = 0) -> None:
-        """Send this cycle's command; ``time`` is that of motion, in whole periods.
-
-        ``sync`` is the number of the SYNC that was just sent.
-        """
+        """Send this cycle's command; ``time`` is that of motion, ``sync`` counts the SYNCs sent."""
         self._time, self._sync = time, sync
         # As in most cycles nothing was ordered; what is ordered meanwhile is taken in the next.
         if self._ordered is not None or self._wanted is not None:
@@ -228,7 +216,7 @@ class Controller:
         feedback = self.axis.feedback
         self.source, self.commanded, self.done = None, 0.0, True
         self.escalation.end()
-        rests = feedback is not None and feedback.state not in _ENABLED and self.axis.at_rest
+        rests = feedback is not None and feedback.state not in POWERED and self.axis.at_rest
         self.phase = Phase.DISABLED if rests else Phase.STOPPING
 
     def _order(self, phase: Phase, reason: str = "") -> None:
@@ -359,9 +347,9 @@ class Controller:
         if enabled and self._held is None:
             self._held = feedback.angle
         self._word = self.axis.send(RequestedState.ENABLE, angle=self._held)
-        if now - self._since > (_GATE_TIME if enabled else _ENABLE_TIME):
+        if now - self._since > (_GATE_TIME if enabled else ENABLE_TIME):
             waiting = "waits for a winch that was to start with it"
-            stays = f"the drive stays {feedback.state} for {_ENABLE_TIME:g} s"
+            stays = f"the drive stays {feedback.state} for {ENABLE_TIME:g} s"
             self._fail(waiting if enabled else stays, now)
 
     def _move(self, now: float, feedback: AxisFeedback) -> None:
@@ -443,7 +431,7 @@ class Controller:
             self.axis.end_stop()
             self._stop_sync = self._sync
             self.escalation.begin(now, nmt=self.axis.stops_on_nmt)
-        if sampled and feedback.state not in _ENABLED and self.axis.at_rest:
+        if sampled and feedback.state not in POWERED and self.axis.at_rest:
             self.escalation.end()
             self.axis.end_stop()
             self._enter(Phase.DISABLED, now)
@@ -452,9 +440,9 @@ class Controller:
         """Use the way to stop that is due in this cycle."""
         axis = self.axis
         fresh = feedback.sync > self._stop_sync and feedback.sync >= self._sync - _FRESH_SYNCS
-        left = fresh and _has_left(feedback.state)
+        left = fresh and has_left(feedback.state)
         by_sdo = axis.sdo_state
-        left = left or (by_sdo is not None and _has_left(by_sdo))
+        left = left or (by_sdo is not None and has_left(by_sdo))
         if self.escalation.method is StopMethod.NMT:
             left = left or not heard_by_sdo(axis.nmt_text)
         answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused
@@ -473,11 +461,6 @@ class Controller:
 def _keeps_enabled(word: int) -> bool:
     """Whether a control word keeps a drive in operation enabled."""
     return word & ENABLE_OPERATION == ENABLE_OPERATION
-
-
-def _has_left(state: DriveState) -> bool:
-    """Whether a status word says that the drive is not in operation enabled."""
-    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
 def heard_by_sdo(nmt: str) -> bool:

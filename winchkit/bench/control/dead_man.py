@@ -53,10 +53,7 @@ class DeadMan:
 
 
 def remaining(duration: float, age: float) -> float:
-    """What is left of a permission of ``duration`` s that was asked for ``age`` s ago, s.
-
-    Raises NotPermitted where nothing is left: whoever asked may have released the key since.
-    """
+    """What is left of a permission of ``duration`` s that was asked for ``age`` s ago, s."""
     if not age < duration:
         raise NotPermitted(
             f"this command was {age:.2f} s on its way, the limit is {duration:.2g} s (a process "

@@ -160,12 +160,7 @@ class FrozenCell:
     """The test for one cell; for one thread. Fed in each control cycle with :meth:`update`."""
 
     def __init__(self, rate: float, *, correlation: float = 0.0, per_count: float = nan) -> None:
-        """Take the cell's properties.
-
-        ``rate`` in conversions per second; noise further apart than ``correlation`` (s) is
-        independent: the amplifier's filter. ``per_count`` is the tension of one raw count (N);
-        NaN takes it from the readings.
-        """
+        """Take conversions a second, the noise's correlation time (s), and N per count, or NaN."""
         self.finding: Frozen | None = None
         self._rate = rate
         self._independent = max(1 / rate, correlation)

@@ -60,12 +60,7 @@ class ControlLoop:
         positions: PositionFile | None = None,
         longest_gap: float = math.inf,
     ) -> None:
-        """Take buses with the host's node id and heartbeat period, and winches by name.
-
-        With ``stop_together`` all winches stop where the drive of one cannot go on. ``latch`` keeps
-        trips and ``positions`` where the drives stand, for later processes. Between two cycles at
-        most ``longest_gap`` (s) may pass.
-        """
+        """Take buses with the host's node id and heartbeat period; at most ``longest_gap`` (s)."""
         self.winches = winches
         self.supervisor = supervisor
         self.callbacks: list[Callback] = []
@@ -183,10 +178,7 @@ class ControlLoop:
             self.supervisor.latch(trip)
 
     def clear_latch(self) -> None:
-        """Clear the acknowledged trips here and on disk; others are written in the next cycle.
-
-        Raises NotPermitted where the latch file cannot be written.
-        """
+        """Clear the acknowledged trips here and on disk; raises NotPermitted where that fails."""
         self._latch.clear()
         self.supervisor.clear()
         self._kept = ()
@@ -362,10 +354,7 @@ class ControlLoop:
         self._show_trips()
 
     def stop_step(self, now: float) -> None:
-        """A cycle after the loop has failed: RPDOs with 02h, SYNC, the host's heartbeat.
-
-        The heartbeat ends where a drive stays in operation enabled.
-        """
+        """A cycle after the loop has failed: 02h, SYNC, and heartbeat if no drive stays enabled."""
         self._count += 1
         for parts in self.winches.values():
             _attempt(parts.axis.begin_cycle, self._count, now)

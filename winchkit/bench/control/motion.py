@@ -42,10 +42,7 @@ class Trim:
         self.done = False
 
     def at(self, time: float, angle: float) -> tuple[float, float, float]:
-        """Motor angle (rad), its velocity (rad/s) and the winding speed (m/s).
-
-        ``time`` in s, ``angle`` (rad) where the move has ended; they are evaluated once a cycle.
-        """
+        """Motor angle (rad), its velocity (rad/s) and the winding speed (m/s), once a cycle."""
         if self._since is None:
             self._since, self._angle = time, angle
         elapsed = time - self._since
@@ -207,10 +204,7 @@ class Jog:
 
 
 def fastest_within(room: float, limits: LimitSpec) -> float:
-    """Largest speed (m/s) from which a winch stops within the room (m).
-
-    The drive's speed lags behind by up to the response time, in which the cable runs on.
-    """
+    """Largest speed (m/s) from which a winch, with its response time, stops within the room (m)."""
     lag = limits.acceleration * limits.response_time
     return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
@@ -222,21 +216,17 @@ class RunDown:
     joins = True
 
     def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
-        self._duration = 0.0
+        self.duration = 0.0
+        """Time to rest, s; known once started."""
         self._cable, self._acceleration = cable, limits.acceleration
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
-
-    @property
-    def duration(self) -> float:
-        """Time to rest, s; known once started."""
-        return self._duration
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin from the target angle and the speed that were in force."""
         self._ramp = Ramp(self._acceleration, winding_speed)
         self._ramp.follow(0.0, time)
-        self._duration = abs(winding_speed) / self._acceleration
+        self.duration = abs(winding_speed) / self._acceleration
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, _now: float) -> Setpoint:
@@ -264,10 +254,7 @@ class PlannedMove:
         holds: bool = False,
         trim: Trim | None = None,
     ) -> None:
-        """Raise NotPermitted for a target or a speed beyond the winch's limits.
-
-        ``trim`` corrects the end for what the cable has become on the way.
-        """
+        """Raise NotPermitted beyond the winch's limits; ``trim`` corrects the end."""
         self.holds = holds
         self._trim = trim
         self.length = length
@@ -346,10 +333,7 @@ def commanded_and_moved(asked: float, moved: float) -> str:
 def within_limits(
     limits: LimitSpec, length: float, speed: float | None, acceleration: float | None
 ) -> tuple[float, float]:
-    """Speed (m/s) and acceleration (m/s²) of a move to a cable length (m), by default the limits.
-
-    Raises NotPermitted for what is beyond the winch's limits.
-    """
+    """Speed (m/s) and acceleration (m/s²) of a move to a length (m), by default the limits."""
     fast = _within("speed", speed, limits.speed, "m/s")
     ramp = _within("acceleration", acceleration, limits.acceleration, "m/s^2")
     if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
@@ -374,11 +358,7 @@ def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
 
 
 class StartGate:
-    """Opens for all members at once, in the first cycle in which each of them is ready.
-
-    The members ask one after another within a cycle while feedback keeps coming in; all get
-    the result of the first.
-    """
+    """Opens for all members at once, in the first cycle in which each of them is ready."""
 
     def __init__(self, ready: Sequence[Callable[[], bool]]) -> None:
         self._ready = ready
@@ -387,6 +367,7 @@ class StartGate:
 
     def open(self, time: float) -> bool:
         """Whether to start in the cycle of this time of motion (s)."""
+        # Feedback keeps coming in within a cycle: all members get the answer of the first.
         if not self._open and time != self._asked:
             self._asked = time
             self._open = all(ready() for ready in self._ready)

@@ -63,11 +63,7 @@ class Instrumented(NamedTuple):
 
 
 class WinchInput(NamedTuple):
-    """Measurements and states of one winch in a cycle; SI.
-
-    A named tuple, since one is made of every winch in every cycle: a frozen dataclass takes
-    several times as long to make.
-    """
+    """Measurements and states of one winch in a cycle, SI; a named tuple is made the fastest."""
 
     feedback_age: float
     """Since the SYNC of the newest complete feedback, s; infinity before the first."""
@@ -249,9 +245,9 @@ class SupervisorMemory:
     tension_rate: float = 0.0
     """N/s, over at least 50 ms."""
     unresponsive: bool = False
+    """Whether the drive did not slow down as it was commanded."""
     reversed: bool = False
     """Of an unresponsive drive: whether it turns the other way than it was ever commanded."""
-    """Whether the drive did not slow down as it was commanded."""
     slip: float = 0.0
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0

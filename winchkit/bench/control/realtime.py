@@ -75,11 +75,7 @@ class RealTime:
         return any(item.name == "scheduling" and item.granted for item in self.items)
 
     def cover(self, urgent: Iterable[int], companions: Iterable[int] = ()) -> None:
-        """Set priorities again, after threads were started.
-
-        ``urgent`` are native thread ids of this process; ``companions`` are processes that belong
-        to it and end with the bench: all their threads get the low priority.
-        """
+        """Set priorities again after threads were started; those of companion processes are low."""
         if self.scheduled:
             _prioritise(frozenset(urgent), self._before, companions)
 
@@ -139,10 +135,7 @@ def _demanded(found: RealTime, request: Request) -> RealTime:
 
 
 class RestCollector:
-    """Runs the older generations of the collector while every drive is disabled and at rest.
-
-    It is called with every cycle's snapshot, on the control thread.
-    """
+    """Runs the older generations of the collector while every drive is disabled and at rest."""
 
     def __init__(self, period: float = 10.0, collect: Callable[[], object] = gc.collect) -> None:
         """Collect at most once a ``period`` (s)."""

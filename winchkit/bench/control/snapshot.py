@@ -97,11 +97,7 @@ class WinchSnapshot(NamedTuple):
 
 
 class WinchSnapshots(Mapping[str, WinchSnapshot]):
-    """The winches of a cycle by name, made at the first access: most cycles have none.
-
-    ``make`` and ``phases`` have what the cycle knew; they give the same whenever and however often
-    they are called.
-    """
+    """The winches of a cycle by name, made at the first access: most cycles have none."""
 
     __slots__ = ("_made", "_make", "phases")
 

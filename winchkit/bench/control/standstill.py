@@ -40,11 +40,7 @@ class StandstillCause:
     """Compares the counters after a standstill with those before; for the control thread only."""
 
     def __init__(self, *, counted: bool = True, proc: Path = Path("/proc")) -> None:
-        """Begin without a reading.
-
-        ``counted`` is false in simulated time, which no counter follows; ``proc`` is the folder of
-        proc(5).
-        """
+        """``counted`` is false in simulated time; ``proc`` is the folder of proc(5)."""
         self._counted = counted
         self._schedstat = str(proc / "thread-self" / "schedstat")
         self._before: _Counters | None = None
@@ -57,10 +53,7 @@ class StandstillCause:
             self._before = self._read(now)
 
     def explain(self, now: float, gap: float, *, between: float) -> str:
-        """The cause of a standstill of ``gap`` s that has ended ``now``, in words.
-
-        ``between`` is how long before ``now`` the last cycle had ended, s; NaN before the first.
-        """
+        """Cause of a standstill of ``gap`` s, ``between`` s after the end of a cycle, in words."""
         if self._before is None or gap <= 0.0:
             return _UNKNOWN
         before, after = self._before, self._read(now)

@@ -91,10 +91,7 @@ class StopEscalation:
         """The method in use; None while nothing is being stopped."""
 
     def begin(self, now: float, *, nmt: bool = False) -> None:
-        """Start with the first method.
-
-        With ``nmt`` the drive was seen to leave operation enabled on NMT stop.
-        """
+        """Start; with ``nmt`` the drive was seen to leave operation enabled on NMT stop."""
         self._table = tuple(row for row in STOP_TABLE if nmt or row.method is not StopMethod.NMT)
         self._level, self._since, self._syncs = 0, now, 0
         self.method = self._table[0].method

@@ -103,10 +103,7 @@ class Supervisor:
                 self.tripped = (*self.tripped, trip)
 
     def acknowledge(self, boot_ups: Mapping[str, int]) -> tuple[Trip, ...]:
-        """Discard what a reset has handled, boot-ups up to now; returns the trips to clear.
-
-        The latch stays until :meth:`clear`. What trips from now on is not cleared by it.
-        """
+        """Discard what a reset has handled; returns the trips that :meth:`clear` will clear."""
         for name, memory in self._memory.items():
             self._memory[name] = SupervisorMemory(memory.own, boot_ups.get(name, memory.boot_ups))
         with self._latching:

@@ -29,7 +29,7 @@ _MARGIN = 2e-3
 """Distance that is kept from the end of the declared travel, m."""
 _STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
-_SLACK_TIME = 0.2
+SLACK_TIME = 0.2
 """A load that swings relieves its cable for less, s."""
 SOFTER = 10.0
 """Times by which a cable with its structure may be softer than the bound of its stiffness: of a
@@ -73,12 +73,7 @@ class TensionSetting:
 
 
 def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) -> float:
-    """Upper bound of the stiffness of a cable, N/m.
-
-    ``length``: free length, m. ``declared``: declared by the caller, N/m. Returns: declared value,
-    else axial stiffness of the profile, else that of a steel bar of the cable's diameter, divided
-    by the length. Raises UsageError where nothing is known of the cable.
-    """
+    """Upper bound of a cable's stiffness, N/m: as declared, by the profile, or of a steel bar."""
     if declared is not None:
         return declared
     axial = cable.axial_stiffness
@@ -117,7 +112,7 @@ class BrokenCable:
         explained = (setting.tension + rise) / setting.stiffness
         slack = tension < setting.slack and (self._taut or wound > explained)
         self._since = min(self._since, now) if slack else math.inf
-        return now - self._since >= _SLACK_TIME
+        return now - self._since >= SLACK_TIME
 
 
 class UsedUp:

@@ -14,7 +14,7 @@ from winchkit.bench.control.observation import Instrumented, WinchInput
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import DriveState
+from winchkit.drivers.can.cia402.state_machine import FAULTS, DriveState
 from winchkit.drivers.reading import InstrumentReading, Sensor
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
@@ -23,7 +23,6 @@ from winchkit.schema.profiles.winch import CableSpec
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
 """SYNC messages that a drive may leave without a TPDO before it counts as silent."""
-_FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__
 _NO_WAY = (0.0, 0.0)
 _NOTHING = AxisFeedback(math.nan, 0, DriveState.UNKNOWN, 0, math.nan, math.nan, math.nan)
@@ -107,7 +106,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             parts.cable.update(_sample(parts, feedback, now))
         cable_length, arm = parts.cable.at(feedback.angle)
         winding_speed = feedback.velocity * arm
-        fault = feedback.state in _FAULTS
+        fault = feedback.state in FAULTS
         doubt = doubt or _beyond_the_drum(parts, cable_length)
         if doubt:
             cable_length = math.nan

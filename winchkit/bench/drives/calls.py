@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import path_of
-from winchkit.bench.cells.instruments import device_of
+from winchkit.bench.cells.instruments import device_of, eds_of
 from winchkit.bench.drives.node_access import bus_only, drive_at, free_bus, nodes_on
 from winchkit.drivers.can.bus.load import BusLoad, FrameKind, load_of
 from winchkit.drivers.can.canopen.identity import Identity
@@ -50,7 +50,7 @@ def _frames(
     if device.servo is None:
         raise FileError(Fault(f"winch {name}: '{winch.servo.device}' is no servo", spec.path))
     servo = device.servo
-    dictionary = read(Path(device.path).parent / servo.eds, 1)
+    dictionary = read(eds_of(device), 1)
     for pdo in servo.tpdo:
         size = _size(dictionary, pdo, device.path)
         yield _sent_by_drive(f"{name} TPDO {pdo.number}", size, pdo)

@@ -22,9 +22,6 @@ from winchkit.errors import DeviceRefused, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
 
-_LISTEN = 1.1
-"""For heartbeats, whose period is a second at most where they are of use, s."""
-
 
 @dataclass(frozen=True)
 class Node:
@@ -52,10 +49,7 @@ def bus_only(interface: str, channel: str, bitrate: int, port: int | None) -> Be
 
 
 def nodes_on(spec: BenchSpec) -> list[ScannedNode]:
-    """Scan every CAN bus of a bench; the owner does it where there is one.
-
-    Raises FileError, ConnectionLost, NotPermitted.
-    """
+    """Scan every CAN bus of a bench, by its owner where there is one; raises ConnectionLost."""
     remote = attach(spec)
     if remote is not None:
         with remote:
@@ -64,7 +58,7 @@ def nodes_on(spec: BenchSpec) -> list[ScannedNode]:
     with _owning(spec):
         for name in _can_buses(spec):
             with _open(spec, name) as bus:
-                found += scan(bus, spec.bus[name], bus.clock, _LISTEN)
+                found += scan(bus, spec.bus[name], bus.clock)
     return named_after(spec, found)
 
 

@@ -57,7 +57,7 @@ def tell_hardware(spec: BenchSpec) -> None:
     """Say on stderr which winches those are, and what stops them."""
     for name, winch in spec.winch.items():
         if winch.host_loss:
-            sys.stderr.write(
+            to_stderr(
                 f"winch {name}: its drive does not notice when this computer falls silent; what "
-                f"stops the winch then is {winch.host_loss_description}\n"
+                f"stops the winch then is {winch.host_loss_description}"
             )

@@ -123,10 +123,7 @@ class Feed:
         *,
         has_drives: bool = True,
     ) -> None:
-        """Listen to winches with their sensors by role, and a tracker, from ``opened`` (s) on.
-
-        Without drives no snapshots are given.
-        """
+        """Listen to winches with their sensors by role, and a tracker, from ``opened`` (s) on."""
         prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
         self.lost = 0
         """Cycles and readings that were dropped because they were not taken in time."""

@@ -6,21 +6,24 @@ import json
 import platform
 import subprocess
 import tomllib
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from winchkit.bench.cells.instruments import refs_of
 from winchkit.regular_file import read_text
 from winchkit.schema.bench import BenchSpec
 
 _LIBRARIES = ("numpy", "canopen", "python-can", "pymodbus", "pyserial", "mcap")
 _TIMEOUT = 2.0
 """s: git answers within some ms; a repository on a dead network drive does not delay a log."""
-_ROLES = ("cell", "load", "length", "temperature")
 
 
 def origin(spec: BenchSpec) -> dict[str, str]:
     """Metadata of a log; unknown items are left out."""
-    about = {"versions": json.dumps(_versions())}
+    system = {"python": platform.python_version(), "system": platform.platform()}
+    about = {"versions": json.dumps({**system, **installed(_LIBRARIES)})}
     if spec.path:
         about |= git_state(Path(spec.path).resolve().parent)
     return about | _calibrations(spec)
@@ -51,26 +54,22 @@ def _git(folder: Path, *words: str) -> str | None:
     return done.stdout.strip() if done.returncode == 0 else None
 
 
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version(), "system": platform.platform()}
-    for name in _LIBRARIES:
-        try:
+def installed(libraries: Sequence[str]) -> dict[str, str]:
+    """Versions of those libraries that are installed."""
+    found = {}
+    for name in libraries:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found
 
 
 def _calibrations(spec: BenchSpec) -> dict[str, str]:
     """Content of every calibration file that the wiring names, as JSON."""
-    found = {}
-    for name, winch in (*spec.winch.items(), *spec.cells.items()):
-        for role in _ROLES:
-            ref = getattr(winch, role)
-            file = getattr(ref, "calibration", None)
-            if file:
-                found[f"calibration.{name}.{role}"] = _content(Path(spec.path).parent / file)
-    return found
+    return {
+        f"calibration.{name}.{role}": _content(Path(spec.path).parent / ref.calibration)
+        for (name, role), ref in refs_of(spec).items()
+        if ref.calibration
+    }
 
 
 def _content(path: Path) -> str:

@@ -207,10 +207,7 @@ class Recorder:
         self._log.write(pieces, now)
 
     def _note_changes(self, snapshot: BenchSnapshot) -> None:
-        """Write an event when a phase, state, commander, trip, warning, tare or overrun changes.
-
-        A warning is new by its kind and winch: its words may hold a number of each cycle.
-        """
+        """Write an event for each change; the words of a warning may have numbers of each cycle."""
         winches = [(w.phase, w.state, w.commander) for w in snapshot.winch.values()]
         warned = [(warning.kind, warning.winch) for warning in snapshot.warnings]
         # The tares are another dictionary only where one has changed.

@@ -26,10 +26,7 @@ _WORDS = {
 
 
 class TripHistory:
-    """A sampler of the control loop that keeps the newest cycles, and stops soon after a trip.
-
-    ``cycle``: period of control, s.
-    """
+    """A sampler of the control loop that keeps the newest cycles, and stops soon after a trip."""
 
     def __init__(self, cycle: float) -> None:
         self._cycles: deque[BenchSnapshot] = deque(maxlen=round((BEFORE + AFTER) / cycle) + 1)

@@ -47,10 +47,7 @@ class LatchFile:
         return trips
 
     def keep(self, trips: Sequence[Trip]) -> Trip | None:
-        """Write the trips; returns a trip with the reason where it cannot.
-
-        Called on the control thread: one write of a fixed size into the page cache.
-        """
+        """Write the trips, on the control thread; returns a trip where it cannot."""
         if not self.path:
             return None
         self._latched = self._latched or bool(trips)

@@ -61,10 +61,7 @@ class PositionFile:
         )
 
     def keep(self, positions: Mapping[str, KeptPosition]) -> Trip | None:
-        """Write the positions; returns a trip with the reason where it cannot.
-
-        Called on the control thread: one write into the page cache.
-        """
+        """Write the positions, on the control thread; returns a trip where it cannot."""
         return self._write(positions, closing=False)
 
     def close_with(self, positions: Mapping[str, KeptPosition]) -> None:
@@ -115,10 +112,7 @@ def _record(positions: Mapping[str, KeptPosition], *, ended: bool) -> str:
 
 
 def _parse(data: bytes) -> tuple[str, bool, dict[str, KeptPosition]]:
-    """Time of a record, whether its bench was closed, and its positions.
-
-    Raises ValueError, KeyError, TypeError for anything else.
-    """
+    """Time of a record, whether it was closed, and its positions; raises ValueError, KeyError."""
     record = json.loads(data)
     if record["schema"] != 1:
         raise ValueError("unknown schema")

@@ -21,11 +21,7 @@ from winchkit.schema.bench import BenchSpec
 
 @contextmanager
 def at_cells(bench_file: str | Path) -> Iterator[BenchCells]:
-    """The instruments of a bench, by its owner or as its owner.
-
-    Raises FileError, ConnectionLost, and NotPermitted where the owner accepts no client, or has
-    opened the bench with other files and others use it.
-    """
+    """The instruments of a bench, by its owner or as its owner; raises NotPermitted."""
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench_file)
@@ -42,10 +38,7 @@ def at_cells(bench_file: str | Path) -> Iterator[BenchCells]:
 
 @contextmanager
 def own_cells(spec: BenchSpec, client: str) -> Iterator[CellDesk]:
-    """The instruments of a bench, opened here as its owner.
-
-    Raises NotPermitted where another process owns it, FileError, ConnectionLost.
-    """
+    """The instruments of a bench, opened here as its owner; raises NotPermitted."""
     with ExitStack() as stack:
         stack.callback(own(spec, client_name(client)).close)
         yield _opened(spec, MonotonicClock(), stack)

@@ -170,10 +170,7 @@ class LifeSigns:
         moved: Callable[[], Iterable[tuple[str, Client]]],
         end: Callable[[Client, list[str], str], None],
     ) -> None:
-        """Take ``moved``: winches that go on by themselves, with the client that commands each.
-
-        ``end`` ramps the winches of a client to rest, for a reason in words.
-        """
+        """Take the winches that go on, and what ramps those of a client to rest, with a reason."""
         self._moved, self._end = moved, end
         self._before = float("inf")
 

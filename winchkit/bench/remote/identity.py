@@ -13,10 +13,7 @@ _STEP = 0.05
 
 
 class LifeSign:
-    """Of one client in another process; its requests are heard in one thread, counted in another.
-
-    ``heard`` is called for each request and each order of the client.
-    """
+    """Of one client in another process; heard in one thread, counted in another."""
 
     def __init__(self) -> None:
         self.silence = 0.0

@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
 from winchkit.bench.drives.set_up_progress import to_stderr
@@ -35,22 +34,10 @@ _FIRST = 10.0
 """For the first client, which waits for the opening, s."""
 _POLL = 0.02
 """s: the process ends that much later than it could."""
-_OWNED = "owned"
-"""In the last line: somebody else owns the bench; attach there."""
 _DEFECT = "defect"
 """In the last line: an exception that is no error of winchkit's own."""
 _PROGRESS = "progress"
 """In the lines before it."""
-
-
-@dataclass(frozen=True)
-class Spawned:
-    """What became of a bench process that was started."""
-
-    owned: bool = False
-    """Whether another process owns the bench already."""
-    error: WinchkitError | None = None
-    """Why it could not open the bench."""
 
 
 def can_spawn(spec: BenchSpec) -> bool:
@@ -59,11 +46,8 @@ def can_spawn(spec: BenchSpec) -> bool:
     return bool(sys.executable and spec.path) and all(b.interface != "virtual" for b in buses)
 
 
-def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
-    """Start a bench process and wait until it has opened the bench, or could not.
-
-    Raises OSError where no process can be started.
-    """
+def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> WinchkitError | None:
+    """Start a bench process and wait; returns why it could not open the bench. Raises OSError."""
     files = [os.path.abspath(file) for file in (spec.path, *effects)]
     command = [sys.executable, "-P", "-m", "winchkit.bench.remote.process", *files]
     with log_path(spec).open("ab") as said:
@@ -84,24 +68,24 @@ def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
             line = replies.readline()
     if sys.platform != "win32":
         process.wait()  # it has left the bench to a process of its own; on Windows it is the bench
-    return _spawned(spec, line)
+    return _error(spec, line)
 
 
-def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
-    """The last line of a bench process, read."""
+def _error(spec: BenchSpec, line: bytes) -> WinchkitError | None:
+    """The error in the last line of a bench process; None where it or another owns the bench."""
     if not line:
         message = f"the bench process ended without opening the bench; see {log_path(spec)}"
-        return Spawned(error=ConnectionLost(message))
+        return ConnectionLost(message)
     reply = json.loads(line)
     if _DEFECT in reply:
         message = (
             f"the bench process failed: {reply[_DEFECT]} (a defect of winchkit, please report it "
             f"with {log_path(spec)})"
         )
-        return Spawned(error=WinchkitError(message))
+        return WinchkitError(message)
     if "error" in reply:
-        return Spawned(error=error_of(reply["error"], reply["message"]))
-    return Spawned(owned=reply.get(_OWNED, False))
+        return error_of(reply["error"], reply["message"])
+    return None
 
 
 def main() -> None:
@@ -135,7 +119,7 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
     spec, name = read_bench(bench_file), client_name("bench process")
     ownership = own_or_find(spec, name)
     if ownership is None:
-        _report(report, {_OWNED: True})
+        _report(report, {"owned": True})
         return
     clock = MonotonicClock()
     spec = spec.with_effects(effects)

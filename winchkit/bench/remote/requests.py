@@ -22,10 +22,7 @@ class OwnerGone(ConnectionLost):
 
 
 class Requests:
-    """One request after another over a socket, each with the answer of its number.
-
-    ``timeout``: time to wait for an answer, s.
-    """
+    """One request after another over a socket, each with the answer of its number."""
 
     def __init__(self, connection: socket.socket, timeout: float) -> None:
         connection.settimeout(timeout)

@@ -63,11 +63,7 @@ class _Request:
             raise UsageError(f"a request that cannot be read: {error}") from None
 
     def bound(self, call: Callable[..., Any]) -> inspect.BoundArguments:
-        """Its arguments for ``call``, a hold shortened by the age.
-
-        Raises UsageError for arguments that do not fit, NotPermitted where it begins a motion and
-        is old.
-        """
+        """Its arguments for ``call``; raises UsageError, NotPermitted for a motion that is old."""
         try:
             asked = inspect.signature(call).bind(*self.arguments, **self.named)
         except TypeError as error:

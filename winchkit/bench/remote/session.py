@@ -147,10 +147,9 @@ def _sought(
             if not can_spawn(spec):
                 return None
             try:
-                spawned = spawn(spec, effects)
+                problem = spawn(spec, effects)
             except OSError:
                 return None
-            problem = spawned.error
             if problem is not None:
                 raise problem
         if late:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.nmt import NmtCommand
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
@@ -65,7 +66,6 @@ class ProcessDecoder:
         return beyond or (self.spec.type == "f32" and 0 < abs(counts) < _TINIEST)
 
 
-_PRE_OPERATIONAL, _START = 0x80, 0x01
 _SILENT_PERIODS = 10
 """A device that sends by an event timer may leave out readings, or have another rate than declared
 by a factor of a few; ten periods are certain (rule of thumb)."""
@@ -118,12 +118,12 @@ class ProcessInstrument(InstrumentReadings):
         """Map its TPDOs and start it; raises NoReply, DeviceRefused, ConnectionLost."""
         node = self._node
         if self.sends:
-            self._bus.nmt(_PRE_OPERATIONAL, node.node)
+            self._bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
             set_up(node, "tpdo", self._codecs)
             for codec in self._codecs:
                 identifier = cob_id("tpdo", codec.spec.number, node.node)
                 self._bus.on(identifier, self._receiver(codec))
-        self._bus.nmt(_START, node.node)
+        self._bus.nmt(NmtCommand.START, node.node)
         self.publisher.tally.reconnects += self._was_set_up
         self._was_set_up, self._heard = True, self._clock.now()
 

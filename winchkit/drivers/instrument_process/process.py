@@ -65,11 +65,7 @@ class ProcessLineSpec:
 
 
 def line_of(line: ProcessLineSpec, clock: Clock) -> Line:
-    """Make a line, not opened yet; its instruments have the order of the declaration.
-
-    Raises FileError where a device file contradicts itself, or a device that sends by itself is
-    not alone on its line.
-    """
+    """Make a line with its instruments, not opened yet; raises FileError for a wrong device."""
     bus = line.spec
     if bus.kind == "serial":
         streams = tuple(
@@ -124,11 +120,7 @@ class InstrumentProcess:
         return None if self._process is None else self._process.pid
 
     def adopt(self, spec: ProcessLineSpec, line: Line) -> SeparateLine:
-        """Serve a line that was made here from ``spec``, and is not served here.
-
-        Returns the line with the instruments as the bench sees them; they take over names,
-        publishers and periods.
-        """
+        """Serve a line that was made here; returns it as the bench sees it, same publishers."""
         instruments = tuple(SeparateInstrument(item, self, self._clock) for item in line.sensors)
         found = SeparateLine(spec.bus, instruments, self, len(self._specs))
         self._specs.append(spec)
@@ -183,10 +175,7 @@ class InstrumentProcess:
         return self._silent
 
     def request(self, place: tuple[int, int], operation: str, *given: Any) -> Future[Any]:
-        """Ask for something; the answer, or the error, comes in the future.
-
-        ``place`` are the numbers of the line and of the instrument on it.
-        """
+        """Ask the instrument at ``place`` (line, number on it); the future has the answer."""
         future: Future[Any] = Future()
         with self._lock:
             self._count += 1

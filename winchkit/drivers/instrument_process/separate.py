@@ -30,10 +30,7 @@ class Serving(Protocol):
         """Why nothing can come: it has ended, or has sent nothing for more than ``silence`` s."""
 
     def request(self, place: tuple[int, int], operation: str, *given: Any) -> Future[Any]:
-        """Ask for something; the answer, or the error, comes in the future.
-
-        ``place`` are the numbers of the line and of the instrument on it.
-        """
+        """Ask the instrument at ``place`` (line, number on it); the future has the answer."""
 
 
 class SeparateInstrument(InstrumentReadings):

@@ -88,11 +88,7 @@ class RegisterDecoder:
     def decode(
         self, registers: Sequence[int], status_registers: Sequence[int] = ()
     ) -> RegisterContent:
-        """Value and gross value (SI or NaN), signed counts, quality, status word.
-
-        ``registers`` are those of the block ``read``, ``status_registers`` those of
-        ``status_read`` where the device has one.
-        """
+        """Value and gross value (SI or NaN), signed counts, quality, status word."""
         words = _placed(self.spec.read, registers) | _placed(
             self.spec.status_read, status_registers
         )

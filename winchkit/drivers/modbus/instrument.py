@@ -43,10 +43,7 @@ class Instrument(InstrumentReadings):
         timeout: float,
         rate: float = inf,
     ) -> None:
-        """Poll as often as the device converts, at most ``rate`` times a second.
-
-        ``timeout`` (s) is the line's for one answer.
-        """
+        """Poll as often as the device converts, at most ``rate`` (1/s); ``timeout`` in s."""
         self.name = name
         self.unit = unit
         self.decoder = RegisterDecoder(device)
@@ -101,14 +98,6 @@ class Instrument(InstrumentReadings):
         self._late.clear()
         self._failures = 0
         self.due = self._clock.now()
-
-    def reopened(self) -> None:
-        """Note that the connection was replaced, because something else than the answer came."""
-        self.publisher.tally.reconnects += 1
-
-    def lost(self, error: ConnectionLost) -> None:
-        """Note that the line is closed."""
-        self.problem = error
 
     async def poll(self, client: ModbusClient) -> bool:
         """Take one reading, and say whether there is one.

@@ -11,7 +11,7 @@ from winchkit.drivers.modbus.decoder import number_of, words_of
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import RECONNECT, LineShare, next_of
+from winchkit.drivers.sharing import RECONNECT, LineShare, SharedLine, next_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.modbus import REGISTERS, CommandSpec, ReadBlock
@@ -26,7 +26,7 @@ _PROBE_SHARE = 4
 """A silent device costs the line a timeout: for each there are four times as long for the rest."""
 
 
-class ModbusLine:
+class ModbusLine(SharedLine):
     """A line of :class:`~winchkit.drivers.slow.SlowDevices`."""
 
     def __init__(
@@ -34,7 +34,7 @@ class ModbusLine:
     ) -> None:
         """Take the instruments of a line, which ``serve`` opens."""
         self.name = name
-        self.sensors = instruments
+        self.sensors: tuple[Instrument, ...] = instruments
         self._spec = spec
         self._clock = clock
         self._client = ModbusClient(spec, name)
@@ -91,14 +91,6 @@ class ModbusLine:
         async with self._lock:
             return await identity(self._client, self._own(sensor))
 
-    def room_for(self, sensor: Sensor) -> float:
-        """Rate that the line allows, independent of the instrument's own rate, 1/s."""
-        return self._share.room_for(self._place(sensor))
-
-    def time_of(self, sensor: Sensor) -> float:
-        """How long a reading of an instrument keeps the line busy, s."""
-        return self._share.time_of(self._place(sensor))
-
     @property
     def note(self) -> str:
         """What its device does otherwise than Modbus TCP has it; empty without a finding."""
@@ -114,9 +106,6 @@ class ModbusLine:
         deadline = self._clock.now() + _OPENING
         while not self._client.connected and self._clock.now() < deadline:
             await asyncio.sleep(_POLL)
-
-    def _place(self, sensor: Sensor) -> int:
-        return self.sensors.index(self._own(sensor))
 
     def _own(self, sensor: Sensor) -> Instrument:
         return next(item for item in self.sensors if item is sensor)
@@ -140,11 +129,11 @@ class ModbusLine:
             await self._client.connect()
         except ConnectionLost as error:
             for instrument in self.sensors:
-                instrument.lost(error)
+                instrument.problem = error
             return False
         for instrument in self.sensors:
-            if self._client.replaced:
-                instrument.reopened()
+            if self._client.replaced:  # because something else than the answer came
+                instrument.publisher.tally.reconnects += 1
             else:
                 instrument.reconnected(again=self._opened)
         self._opened, self._client.replaced = True, False

@@ -33,10 +33,7 @@ class Transactions:
         self._margin = _MARGIN
 
     def note(self, block: bytes, data: bytes) -> None:
-        """Keep what the newest answer holds.
-
-        ``data``: the answer behind unit and function.
-        """
+        """Keep what the newest answer holds behind unit and function."""
         for first in self._begin.get(block, b""):
             self._held[first] -= 1
         self._begin[block] = data[:-1]

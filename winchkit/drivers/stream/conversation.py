@@ -167,10 +167,7 @@ class Conversation:
         self._selected = instrument
 
     async def _exchange(self, instrument: StreamInstrument, ask: AskSpec, timeout: float) -> None:
-        """Send something and wait for the answer that must come, if any must.
-
-        What an instrument sends by itself meanwhile is published.
-        """
+        """Send something and wait for its answer; what comes by itself meanwhile is published."""
         by_itself = instrument.spec.mode == "continuous"
         parser = instrument.parser if by_itself else instrument.talk
         if not by_itself:

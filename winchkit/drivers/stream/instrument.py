@@ -50,11 +50,7 @@ class StreamInstrument(InstrumentReadings):
         timeout: float,
         rate: float = inf,
     ) -> None:
-        """Poll as often as the device converts, at most ``rate`` times a second.
-
-        One that sends by itself is heard as often as it sends. ``timeout`` (s) is the line's for
-        one answer. Raises FileError where the device file contradicts itself.
-        """
+        """Poll as often as the device converts, at most ``rate`` (1/s); ``timeout`` in s."""
         self.name = name
         self.address = address
         self.spec = spec = stream_of(device)

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import RECONNECT, RETRY, LineShare, next_of
+from winchkit.drivers.sharing import RECONNECT, RETRY, LineShare, SharedLine, next_of
 from winchkit.drivers.stream.conversation import Conversation, exchange_time
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.port import SerialPort, open_serial
@@ -20,7 +20,7 @@ _LISTEN = 0.05
 Opener = Callable[[BusSpec, str, Clock], Awaitable[SerialPort]]
 
 
-class StreamLine:
+class StreamLine(SharedLine):
     """A line of :class:`~winchkit.drivers.slow.SlowDevices`."""
 
     def __init__(
@@ -33,13 +33,9 @@ class StreamLine:
         opener: Opener = open_serial,
         pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
-        """Take the instruments of a line, which ``serve`` opens.
-
-        ``opener`` opens the port, ``pause`` waits while there is none. Raises FileError where a
-        device that sends by itself is not alone.
-        """
+        """Take the instruments of a line; ``pause`` waits while there is no port."""
         self.name = name
-        self.sensors = instruments
+        self.sensors: tuple[StreamInstrument, ...] = instruments
         self._spec = spec
         self._clock = clock
         self._opener = opener
@@ -60,21 +56,10 @@ class StreamLine:
             )
         self._share_out()
 
-    def room_for(self, sensor: Sensor) -> float:
-        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
-        return self._share.room_for(self._place(sensor))
-
-    def time_of(self, sensor: Sensor) -> float:
-        """How long a reading of an instrument keeps the line busy, s."""
-        return self._share.time_of(self._place(sensor))
-
     @property
     def note(self) -> str:
         """Remark on the port, e.g. on its adapter; empty where there is none."""
         return self._talk.port.note if self._talk else ""
-
-    def _place(self, sensor: Sensor) -> int:
-        return next(k for k, item in enumerate(self.sensors) if item is sensor)
 
     def _share_out(self) -> None:
         """Give every polled instrument the rate that is to be expected."""

@@ -31,10 +31,7 @@ class Matcher:
         self._first = parts[0].literal[:1] if parts else ""
 
     def match(self, line: str) -> Match | None:
-        """Fit the whole line or, where the template begins with a literal, its last frame.
-
-        Characters before that literal are garbage: a half frame, a byte of noise.
-        """
+        """Fit the whole line or, where the template begins with a literal, its last frame."""
         found = self._pattern.fullmatch(line)
         start = 0
         if found is None and self._first:

@@ -55,10 +55,7 @@ class StreamParser:
         return self._framing.pending
 
     def begin(self, *, sure: bool = True) -> None:
-        """Forget what is half; ``sure`` where a frame begins with the next byte.
-
-        After a request it does; a line that listens must first receive the end of one.
-        """
+        """Forget what is half; ``sure`` where a frame begins next, as after a request."""
         self._framing.begin(sure=sure)
         self._count_skipped()
 

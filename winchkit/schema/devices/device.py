@@ -45,6 +45,11 @@ class DeviceSpec(Table):
         return next((table for table in TABLES if getattr(self, table) is not None), "nothing")
 
     @property
+    def instrument(self) -> ModbusSpec | StreamSpec | ProcessSpec | None:
+        """The table of an instrument; None for a drive."""
+        return self.modbus or self.stream or self.process
+
+    @property
     def unit(self) -> str:
         """Unit of the value of an instrument; empty for a drive, or where a frame names several."""
         if self.modbus is not None:
@@ -65,7 +70,7 @@ class DeviceSpec(Table):
     @property
     def commands(self) -> dict[str, bool]:
         """Commands of an instrument by name, and whether each writes its EEPROM."""
-        table = self.modbus or self.stream or self.process
+        table = self.instrument
         if table is None:
             return {}
         return {name: getattr(item, "permanent", False) for name, item in table.command.items()}

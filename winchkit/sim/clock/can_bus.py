@@ -21,11 +21,7 @@ _ALL = range(0x800)
 
 
 class SimulatedCanBus:
-    """One bus with its simulated devices at one side and any number of ports at the other.
-
-    ``deliver`` passes frames to the devices. ``wire`` is between the two sides: a frame that it
-    loses or delays is lost or delayed for the whole other side.
-    """
+    """One bus: its devices at one side of ``wire``, any number of ports at the other."""
 
     def __init__(
         self,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.instruments.stream import SimulatedStreamInstrument
+from winchkit.sim.instruments.stream import SerialCable, SimulatedStreamInstrument
 
 _TICK = 2e-3
 """s, as of the line in real time."""
@@ -15,7 +15,7 @@ _TIMEOUT = 0.1
 """Time-out of a read, s."""
 
 
-class SimulatedSerialLine:
+class SimulatedSerialLine(SerialCable):
     """One line with its instruments, reached at :attr:`port` through the clock."""
 
     def __init__(
@@ -25,7 +25,7 @@ class SimulatedSerialLine:
         clock: SimulatedClock,
     ) -> None:
         self.port = f"simulated-{os.urandom(4).hex()}"
-        self._instruments, self._up_to_date = tuple(instruments), up_to_date
+        super().__init__(instruments, up_to_date, clock.now)
         self._clock = clock
         self._end: _SerialEnd | None = None
         self._plugged, self._stopped = True, False
@@ -42,7 +42,7 @@ class SimulatedSerialLine:
 
     def write(self, data: bytes) -> None:
         """Take bytes from the host."""
-        self._serve(data)
+        self._send(data)
 
     def _connect(self) -> _SerialEnd:
         if not self._plugged:
@@ -50,34 +50,24 @@ class SimulatedSerialLine:
         self._end = _SerialEnd(self, self._clock)
         return self._end
 
+    def _plug_in(self) -> None:
+        self._plugged = True
+
     def _unplug(self) -> None:
         self._plugged = False
         if self._end is not None:
-            self._end.lose()
+            self._end.close()
             self._end = None
 
     def _tick(self) -> None:
         if self._stopped:
             return
-        for instrument in self._instruments:
-            if "unplug" in instrument.faults:
-                instrument.faults.discard("unplug")
-                self._unplug()
-            if "replug" in instrument.faults:
-                instrument.faults.discard("replug")
-                self._plugged = True
-        self._serve(b"")
+        self._obey_the_cable()
+        self._send(b"")
         self._clock.call_at(self._clock.now() + _TICK, self._tick)
 
-    def _serve(self, received: bytes) -> None:
-        """Pass received bytes to the instruments, and send their output that is due."""
-        said = b""
-        with self._up_to_date():
-            now = self._clock.now()
-            for instrument in self._instruments:
-                if received:
-                    instrument.receive(received, now)
-                said += instrument.take_output(now)
+    def _send(self, received: bytes) -> None:
+        said = self._serve(received)
         if said and self._end is not None:
             self._end.take(said)
 
@@ -111,7 +101,7 @@ class _SerialEnd:
         return len(data)
 
     def close(self) -> None:
-        """Close the port."""
+        """Close the port, or disconnect it as if the adapter were unplugged."""
         self._lost = True
         self._arrived.set()
 
@@ -119,10 +109,6 @@ class _SerialEnd:
         """Take bytes that have arrived."""
         self._bytes += data
         self._arrived.set()
-
-    def lose(self) -> None:
-        """Disconnect, as if the adapter were unplugged."""
-        self.close()
 
     def _check(self) -> None:
         if self._lost:

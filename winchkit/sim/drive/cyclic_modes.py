@@ -69,10 +69,7 @@ class _Interpolation:
 
 
 class CyclicPosition(SetPoints):
-    """CSP: target position 607Ah and its offset 60B0h, with 60B1h fed forward.
-
-    ``smoothing`` (s) averages the targets, as in CSV.
-    """
+    """CSP: target position 607Ah and its offset 60B0h, with 60B1h fed forward."""
 
     position = True
     cyclic = True

@@ -13,7 +13,7 @@ from winchkit.sim.drive.faults import FAULTS, FaultKind, known
 from winchkit.sim.drive.homing import Switches
 from winchkit.sim.drive.modes import Mode, check_objects, modes_of, supported
 from winchkit.sim.drive.motion import DriveMotion
-from winchkit.sim.drive.nmt import Heartbeats, NodeState, emergency_frame
+from winchkit.sim.drive.nmt import NMT_COMMANDS, Heartbeats, NodeState, emergency_frame
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.pdo import Pdos
 from winchkit.sim.drive.power import PowerCommand, PowerStage, PowerState
@@ -31,10 +31,7 @@ _STORM_CODE = 0x8120
 
 
 class FrameSender:
-    """Sends frames at once, late, or not at all.
-
-    ``emergency`` sends an EMCY of a code; a storm calls it every millisecond.
-    """
+    """Sends frames at once, late, or not at all; a storm calls ``emergency`` every millisecond."""
 
     def __init__(
         self, send: Callable[[int, bytes], None], emergency: Callable[[int], None]
@@ -78,11 +75,6 @@ _BOOT_SHARE = 0.8
 _HEARTBEAT_LOST = FaultKind(0x8130)
 _PDO_TOO_SHORT = 0x8210
 """EMCY error code of CiA 301: PDO not processed due to length error."""
-_NMT_COMMANDS = {
-    0x01: NodeState.OPERATIONAL,
-    0x02: NodeState.STOPPED,
-    0x80: NodeState.PRE_OPERATIONAL,
-}
 _COMMUNICATION = range(0x1000, 0x2000)
 
 
@@ -282,8 +274,8 @@ class SimDrive:
             self.power_on(now)
         elif command == 0x82:
             self._reset_communication(now)
-        elif command in _NMT_COMMANDS:
-            self._enter_nmt(_NMT_COMMANDS[command])
+        elif command in NMT_COMMANDS:
+            self._enter_nmt(NMT_COMMANDS[command])
 
     def _enter_nmt(self, state: NodeState) -> None:
         before, self.nmt = self.nmt, state

@@ -27,10 +27,7 @@ _HOLD, _BRAKED, _FREE = DriveCommand(), DriveCommand.off(brake=True), DriveComma
 
 
 class DriveMotion:
-    """Computes a :class:`DriveCommand` from an order, the mode and the targets.
-
-    ``angle`` and ``speed`` of the methods are those of the motor, rad and rad/s.
-    """
+    """Computes a :class:`DriveCommand` from an order, the mode and the targets."""
 
     def __init__(
         self,

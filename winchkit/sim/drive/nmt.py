@@ -28,6 +28,14 @@ class NodeState(IntEnum):
     PRE_OPERATIONAL = 127
 
 
+NMT_COMMANDS = {
+    0x01: NodeState.OPERATIONAL,
+    0x02: NodeState.STOPPED,
+    0x80: NodeState.PRE_OPERATIONAL,
+}
+"""NMT state by the command that enters it (CiA 301)."""
+
+
 class Heartbeats:
     """Produces the drive's heartbeat (1017h) and monitors those of other nodes (1016h).
 

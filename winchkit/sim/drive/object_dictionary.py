@@ -142,10 +142,7 @@ class ObjectDictionary:
                 self._values[key] = self._stored.get(key, entry.default)
 
     def number(self, index: int, sub: int = 0, default: int | None = None) -> int:
-        """Present value of a numeric object, or the default where the EDS does not declare it.
-
-        KeyError where there is no default either.
-        """
+        """Present value of a numeric object, or the default without one; raises KeyError."""
         key = index, sub
         value = self._values.get(key, default)
         if value is None:
@@ -183,10 +180,7 @@ class ObjectDictionary:
         return pattern.pack(*[value() for value in sources])
 
     def receiver(self, keys: tuple[Key, ...], sizes: tuple[int, ...]) -> Callable[[bytes], None]:
-        """Function that writes several objects from bytes on the bus, each of a size in bytes.
-
-        An object that is missing, that cannot be written or that has another size is skipped.
-        """
+        """Function that writes objects of given sizes from bytes; what does not fit is skipped."""
         pattern, kept = "<", []
         for key, size in zip(keys, sizes, strict=True):
             entry = self._entries.get(key)

@@ -11,10 +11,7 @@ _VOLTAGE, _REMOTE, _REACHED, _LIMIT = 1 << 4, 1 << 9, 1 << 10, 1 << 11
 
 
 class StatusBits:
-    """Times for which the motor has been within its windows, and status bits.
-
-    With ``toggling``, bit 10 is the parity of ``syncs`` in the cyclic modes.
-    """
+    """Times within the windows, and status bits; ``toggling``: bit 10 is the parity of SYNCs."""
 
     def __init__(self, objects: ObjectDictionary, motion: DriveMotion, *, toggling: bool) -> None:
         self._objects, self._motion, self._toggling = objects, motion, toggling

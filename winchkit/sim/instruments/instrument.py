@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 
 from winchkit.errors import UsageError, suggest
 from winchkit.schema.devices.modbus import StatusMeaning
+from winchkit.units import convert, dimension_of, factor
 
 _FAST, _SLOW = 0.05, 0.5
 """Time constants of the two averages whose difference indicates motion, s."""
@@ -153,6 +154,15 @@ class SimulatedInstrument:
             self._zero = self._shown.value
         elif name == "tare" and not self._shown.broken:
             self._tare, self._net = self.gross, True
+
+
+def in_unit(unit: str, measure: Callable[[], float], digit: float = 1.0) -> Callable[[], float]:
+    """Convert a measurement in SI to multiples of ``digit`` of the device's unit."""
+    dimension = dimension_of(unit)
+    if dimension is None:
+        raise UsageError(f"unknown unit '{unit}' of a simulated instrument")
+    size, origin = factor(unit, dimension) * digit, convert(0.0, unit, dimension)
+    return lambda: (measure() - origin) / size
 
 
 def status_word(

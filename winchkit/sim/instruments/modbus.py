@@ -6,7 +6,6 @@ import struct
 from collections.abc import Callable
 from math import isnan
 
-from winchkit.errors import UsageError
 from winchkit.schema.devices.modbus import (
     REGISTERS,
     CommandSpec,
@@ -16,8 +15,7 @@ from winchkit.schema.devices.modbus import (
     StatusMeaning,
     ValueType,
 )
-from winchkit.sim.instruments.instrument import SimulatedInstrument, status_word
-from winchkit.units import convert, dimension_of, factor
+from winchkit.sim.instruments.instrument import SimulatedInstrument, in_unit, status_word
 
 _BITS = {"u16": 16, "i16": 16, "u32": 32, "i32": 32}
 _DECIMALS = 2
@@ -50,10 +48,7 @@ def decimals_of(field: FieldSpec) -> int:
 
 
 def encode(field: FieldSpec, counts: float) -> list[int]:
-    """Registers of a field, in the order of their addresses.
-
-    With a sign bit the registers have the magnitude; the sign is in the status word.
-    """
+    """Registers of a field in the order of their addresses; magnitudes where it has a sign bit."""
     return encode_number(
         field.type, field.order, abs(counts) if field.sign_bit is not None else counts
     )
@@ -202,9 +197,4 @@ class ModbusInstrument(SimulatedInstrument):
 
 def in_unit_of(spec: ModbusSpec, measure: Callable[[], float]) -> Callable[[], float]:
     """Convert a measurement in SI to the unit of the device's value."""
-    unit = next(field.unit for field in spec.field if field.name == spec.value)
-    dimension = dimension_of(unit)
-    if dimension is None:
-        raise UsageError(f"unknown unit '{unit}' of a simulated instrument")
-    size, origin = factor(unit, dimension), convert(0.0, unit, dimension)
-    return lambda: (measure() - origin) / size
+    return in_unit(next(one.unit for one in spec.field if one.name == spec.value), measure)

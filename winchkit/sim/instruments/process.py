@@ -10,13 +10,12 @@ from pathlib import Path
 
 from winchkit.schema.devices.modbus import StatusMeaning
 from winchkit.schema.devices.process import ProcessSpec
-from winchkit.sim.drive.nmt import Heartbeats, NodeState
+from winchkit.sim.drive.nmt import NMT_COMMANDS, Heartbeats, NodeState
 from winchkit.sim.drive.object_dictionary import Abort, Entry, Key, ObjectDictionary, read_eds
 from winchkit.sim.drive.pdo import Pdos
 from winchkit.sim.drive.sdo import SdoServer
 from winchkit.sim.instruments.instrument import SimulatedInstrument, status_word
 
-_NMT = {0x01: NodeState.OPERATIONAL, 0x02: NodeState.STOPPED, 0x80: NodeState.PRE_OPERATIONAL}
 _RESET = (0x81, 0x82)
 _SYNC = 0x1005
 """CiA 301: COB-ID SYNC."""
@@ -25,10 +24,7 @@ _NO_NUMBER = 0x7FC00000
 
 
 class SimulatedProcessInstrument(SimulatedInstrument):
-    """One node. ``measure`` returns the present quantity in the unit of the device file.
-
-    ``send`` takes an identifier and data.
-    """
+    """One node. ``measure`` returns the present quantity in the unit of the device file."""
 
     KIND = "a simulated CANopen instrument"
     FAULTS = ("silence", "frozen", "overload", "sensor break", "reboot", "recover")
@@ -110,7 +106,7 @@ class SimulatedProcessInstrument(SimulatedInstrument):
         if command in _RESET:
             self._reboot()
         else:
-            self.nmt = _NMT.get(command, self.nmt)
+            self.nmt = NMT_COMMANDS.get(command, self.nmt)
 
     def _reboot(self) -> None:
         self._zero, self._tare, self._net = 0.0, 0.0, False

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from math import nan
 
-from winchkit.errors import UsageError
 from winchkit.schema.devices.stream import AskSpec, StreamSpec
-from winchkit.sim.instruments.instrument import SimulatedInstrument
+from winchkit.sim.instruments.instrument import SimulatedInstrument, in_unit
 from winchkit.sim.instruments.stream_frames import IndicatorState, Speech, example_unit
-from winchkit.units import convert, dimension_of, factor
 
 
 class SimulatedStreamInstrument(SimulatedInstrument):
-    """One device on a serial line, with input :meth:`receive` and output :meth:`take_output`.
-
-    ``measure`` returns the present quantity in counts of the device (:func:`shown_by`).
-    """
+    """One device on a serial line; ``measure`` gives the quantity in counts of the device."""
 
     KIND = "a simulated serial instrument"
     FAULTS = (
@@ -194,8 +191,47 @@ class _Digits:
 def shown_by(spec: StreamSpec, measure: Callable[[], float]) -> Callable[[], float]:
     """Convert a measurement in SI to counts of the device, in the unit of its example."""
     one = example_unit(spec)
-    dimension = dimension_of(one.unit)
-    if dimension is None:
-        raise UsageError(f"unknown unit '{one.unit}' of a simulated instrument")
-    size, origin = factor(one.unit, dimension) * one.scale, convert(0.0, one.unit, dimension)
-    return lambda: (measure() - origin) / size
+    return in_unit(one.unit, measure, one.scale)
+
+
+class SerialCable(ABC):
+    """Instruments on a serial line whose cable can be unplugged.
+
+    ``up_to_date`` advances the simulation to the present time and locks it; ``now`` is its time.
+    """
+
+    def __init__(
+        self,
+        instruments: Sequence[SimulatedStreamInstrument],
+        up_to_date: Callable[[], AbstractContextManager[None]],
+        now: Callable[[], float],
+    ) -> None:
+        self._instruments = tuple(instruments)
+        self._up_to_date, self._now = up_to_date, now
+
+    @abstractmethod
+    def _plug_in(self) -> None:
+        """Connect the host."""
+
+    @abstractmethod
+    def _unplug(self) -> None:
+        """Disconnect the host."""
+
+    def _obey_the_cable(self) -> None:
+        """Execute the faults ``unplug`` and ``replug``, each once."""
+        for instrument in self._instruments:
+            for fault, action in (("unplug", self._unplug), ("replug", self._plug_in)):
+                if fault in instrument.faults:
+                    instrument.faults.discard(fault)
+                    action()
+
+    def _serve(self, received: bytes) -> bytes:
+        """Pass received bytes to the instruments and return their output that is due."""
+        said = b""
+        with self._up_to_date():
+            now = self._now()
+            for instrument in self._instruments:
+                if received:
+                    instrument.receive(received, now)
+                said += instrument.take_output(now)
+        return said

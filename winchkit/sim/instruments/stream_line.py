@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from winchkit.errors import ConnectionLost
-from winchkit.sim.instruments.stream import SimulatedStreamInstrument
+from winchkit.sim.instruments.stream import SerialCable, SimulatedStreamInstrument
 
 _TICK = 2e-3
 """s: a conversion is sent that much late, a tenth of the period of a cell of 50 Hz."""
@@ -22,11 +22,10 @@ _AT_ONCE = 4096
 """Bytes: more than any command, the buffer of a pseudo-terminal."""
 
 
-class SimulatedStreamLine:
+class SimulatedStreamLine(SerialCable):
     """One serial line with its instruments, reached at :attr:`port`.
 
-    ``up_to_date`` is entered on this line's thread: it advances the simulation to the present time
-    and locks it. ``now`` is the simulation's time then. The port is a symbolic link, which does not
+    ``up_to_date`` is entered on this line's thread. The port is a symbolic link, which does not
     change when the line is unplugged and plugged in again.
     """
 
@@ -36,9 +35,7 @@ class SimulatedStreamLine:
         up_to_date: Callable[[], AbstractContextManager[None]],
         now: Callable[[], float],
     ) -> None:
-        self._instruments = tuple(instruments)
-        self._up_to_date = up_to_date
-        self._now = now
+        super().__init__(instruments, up_to_date, now)
         self._folder = tempfile.TemporaryDirectory(prefix="winchkit-")
         self.port = str(Path(self._folder.name) / "tty")
         self._ends: tuple[int, int] | None = None
@@ -95,27 +92,6 @@ class SimulatedStreamLine:
             data = self._serve(os.read(ours, _AT_ONCE) if ready else b"")
             if data:
                 _write(ours, data)
-
-    def _obey_the_cable(self) -> None:
-        """Execute the faults ``unplug`` and ``replug``, each once."""
-        for instrument in self._instruments:
-            if "unplug" in instrument.faults:
-                instrument.faults.discard("unplug")
-                self._unplug()
-            if "replug" in instrument.faults:
-                instrument.faults.discard("replug")
-                self._plug_in()
-
-    def _serve(self, received: bytes) -> bytes:
-        """Pass received bytes to the instruments and return their output that is due."""
-        said = b""
-        with self._up_to_date():
-            now = self._now()
-            for instrument in self._instruments:
-                if received:
-                    instrument.receive(received, now)
-                said += instrument.take_output(now)
-        return said
 
 
 def _write(end: int, data: bytes) -> None:

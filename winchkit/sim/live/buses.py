@@ -60,10 +60,7 @@ class BusWire:
     def disturb(
         self, identifiers: Container[int], *, share: float = 1.0, delay: float | None = None
     ) -> Callable[[], None]:
-        """Lose a share of these frames, or delay it by ``delay`` s.
-
-        Returns a function that ends it. Raises UsageError for an impossible share or delay.
-        """
+        """Lose a share of these frames, or delay it by ``delay`` s; returns what ends it."""
         if not 0 < share <= 1 or not (delay is None or delay > 0):
             raise UsageError(
                 f"a wire cannot disturb a share of {share:g} of its frames by {delay} s; "
@@ -172,10 +169,7 @@ class _AnyInterface:
 
 
 class CanPort:
-    """An open CAN bus; raises ConnectionLost.
-
-    ``wire`` is between the simulated drives and the bus.
-    """
+    """An open CAN bus behind a ``wire``; raises ConnectionLost."""
 
     def __init__(self, spec: BusSpec, wire: BusWire) -> None:
         self.wire = wire

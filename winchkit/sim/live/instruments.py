@@ -14,12 +14,12 @@ from winchkit.schema.bench import BusSpec, DeviceRef, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.sim.clock.serial_line import SimulatedSerialLine
 from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.instruments.instrument import in_unit
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
 from winchkit.sim.instruments.modbus_line import SimulatedModbusLine
 from winchkit.sim.instruments.process import SimulatedProcessInstrument
 from winchkit.sim.instruments.stream import SimulatedStreamInstrument, shown_by
 from winchkit.sim.instruments.stream_line import SimulatedStreamLine
-from winchkit.units import dimension_of, factor
 
 Instrument = ModbusInstrument | SimulatedStreamInstrument | SimulatedProcessInstrument
 Send = Callable[[int, bytes], None]
@@ -34,10 +34,7 @@ def instruments_of(
     *,
     now: float,
 ) -> dict[str, Instrument]:
-    """Instruments by role; ``quantities`` return the measured quantity of each role, SI.
-
-    ``send`` is for instruments on the CAN bus of the servo.
-    """
+    """Instruments by role; ``quantities`` return the measured quantity of each, SI."""
     found: dict[str, Instrument] = {}
     for role, measure in quantities.items():
         ref: DeviceRef | None = getattr(wiring, role)
@@ -64,10 +61,9 @@ def _instrument(
         shown = shown_by(device.stream, measure)
         return SimulatedStreamInstrument(device.stream, shown, now=now, address=ref.unit)
     if device.process is not None and ref.node is not None:
-        spec = device.process
-        size = factor(spec.unit, dimension_of(spec.unit) or "")
+        spec, shown = device.process, in_unit(device.process.unit, measure)
         return SimulatedProcessInstrument(
-            spec, path.parent / spec.eds, ref.node, lambda: measure() / size, send, now=now
+            spec, path.parent / spec.eds, ref.node, shown, send, now=now
         )
     raise FileError(f"{path}: '{ref.device}' is not an instrument that can be simulated here")
 

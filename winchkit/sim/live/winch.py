@@ -130,10 +130,7 @@ class LiveWinch:
             one.receive(identifier, data, now)
 
     def tick(self, now: float, all_heard: bool = True) -> None:
-        """Make the conversions that are due, and evaluate the timers of the devices.
-
-        A loss of the master is judged where all frames have been heard.
-        """
+        """Make due conversions and evaluate the timers; a lost master once all was heard."""
         self._convert(now)
         self.drive.tick(now, all_heard)
         for one in self._devices:

@@ -68,10 +68,7 @@ def with_unit(kind: type, name: str, value: float) -> str | float:
 
 
 def overridden(profile: WinchProfile, overrides: Mapping[str, Any]) -> WinchProfile:
-    """Replace numbers of a profile by the true ones, by dotted keys such as ``pulley.0.radius``.
-
-    Raises FileError with every key that does not exist and every number that cannot be read.
-    """
+    """Replace numbers of a profile by keys such as ``pulley.0.radius``; raises FileError."""
     faults: list[Fault] = []
     for key, raw in dotted_keys(overrides):
         try:

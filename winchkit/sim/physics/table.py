@@ -71,10 +71,7 @@ _ORDER = {kind: place for place, kind in enumerate(PHYSICS.values())}
 
 
 def build(hidden: Sequence[HiddenSpec]) -> list[Physics]:
-    """Create the named effects in the order in which they act.
-
-    Raises FileError with every fault: an unknown name, an unknown number, a wrong unit.
-    """
+    """Create the named effects in the order in which they act; raises FileError with all."""
     faults: list[Fault] = []
     pieces: list[Physics] = []
     for spec in hidden:

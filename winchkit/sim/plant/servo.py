@@ -72,11 +72,7 @@ class Servo:
         inertia: float,
         dt: float,
     ) -> float:
-        """Mean acceleration of the motor over the next ``dt`` s, rad/s².
-
-        ``idle_torque`` (N m) is the torque at constant speed, ``inertia`` (kg m²) the accelerated
-        inertia; a torque limit restricts the acceleration by both.
-        """
+        """Mean acceleration over ``dt`` s, rad/s², at an idle torque, N m, and inertia, kg m²."""
         if not dt > 0:
             raise UsageError(f"a time step of {dt:g} s must be positive")
         if command.brake:

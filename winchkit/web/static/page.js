@@ -159,7 +159,8 @@ export function dialog(title, ...content) {
   fill(box, el("div", { class: "row", style: { marginBottom: "12px" } }, el("h2", {}, title),
     el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
   box.setAttribute("aria-label", title);
-  box.onclose = () => { if (box.contains((messages.get("order") || {}).node || null)) alarm(""); place(); if (before && before.focus) before.focus(); };
+  // The event comes a frame after the closing: a dialog that was opened since keeps its focus.
+  box.onclose = () => { if (!box.open && box.contains((messages.get("order") || {}).node || null)) alarm(""); place(); if (!box.open && before && before.focus) before.focus(); };
   if (!box.open) box.show();
   place();
   (box.querySelector("select, input, .primary") || box.querySelector("button")).focus();

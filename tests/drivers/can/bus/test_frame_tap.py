@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import time
 
+from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.clock import MonotonicClock
@@ -17,9 +17,7 @@ def test_sent_and_received_frames_are_collected_until_the_tap_expires() -> None:
     tap = here.tap = FrameTap(math.inf)
 
     def receive(count: int) -> None:
-        end = time.monotonic() + 20.0
-        while here.received < count and time.monotonic() < end:
-            time.sleep(0.005)
+        until(lambda: here.received >= count)
         assert here.received == count
 
     try:

@@ -10,6 +10,7 @@ import can
 import pytest
 
 from sim_process import free_port
+from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.interface import _Library
 from winchkit.drivers.clock import MonotonicClock
@@ -51,10 +52,7 @@ def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None
             thread.join()
         stranger.send(can.Message(arbitration_id=_RPDO, data=b"\x06\0", is_extended_id=False))
         stranger.send(can.Message(arbitration_id=0x702, data=b"\x05", is_extended_id=False))
-        deadline = time.monotonic() + 5.0
-        while not seen:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        until(lambda: bool(seen))
         assert bus.received == 2, "what was sent does not come back"
         assert heard == [b"\x06\0"]
     finally:

@@ -6,11 +6,11 @@ import itertools
 import math
 import random
 import time
-from collections.abc import Iterator
 
 import pytest
 
-from drive_on_bus import CLOCK, Driven, DriveOnBus, device, driven_bus, run_cycles, run_until
+from drive_on_bus import CLOCK, Driven, DriveOnBus, device, run_cycles, run_until
+from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
@@ -18,12 +18,6 @@ from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import NoReply, NotPermitted
 
 _marks = itertools.count(1)
-
-
-@pytest.fixture
-def rig() -> Iterator[Driven]:
-    with driven_bus() as made:
-        yield made
 
 
 def axis_on(bus: CanBus, *, brake: bool = True, node: int = 1, cycle: float = 0.004) -> Cia402Axis:
@@ -52,10 +46,7 @@ def words_so_far(drive: DriveOnBus, bus: CanBus) -> int:
     """How many control words were sent: frames keep their order, so a last one is waited for."""
     mark = (0x7F0, next(_marks).to_bytes(4, "little"))
     bus.send(*mark)
-    deadline = time.monotonic() + 3.0
-    while mark not in drive.frames:
-        assert time.monotonic() < deadline
-        time.sleep(0.001)
+    until(lambda: mark in drive.frames, 3.0, every=0.001)
     return len(drive.words())
 
 
@@ -173,10 +164,8 @@ def test_no_snapshot_is_made_of_two_syncs(rig: Driven) -> None:
     axis.commission()
     axis.begin_cycle(next(_marks), 5.0)
     bus.sync()
-    deadline = time.monotonic() + 3.0
-    while axis.feedback is None:
-        assert time.monotonic() < deadline
-        time.sleep(0.001)
+    until(lambda: axis.feedback is not None, 3.0, every=0.001)
+    assert axis.feedback is not None
     assert axis.feedback.time == 5.0
     axis.begin_cycle(next(_marks), 6.0)
     time.sleep(0.02)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import struct
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from drive_on_bus import CLOCK, Driven, device, driven_bus, run_cycles, run_until
+from drive_on_bus import CLOCK, Driven, device, run_cycles, run_until
 from hand_made import NODE, RPDO, HandMade, codec
 from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
@@ -20,12 +19,6 @@ from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
-
-
-@pytest.fixture
-def rig() -> Iterator[Driven]:
-    with driven_bus() as made:
-        yield made
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 
 import pytest
 
-from drive_on_bus import CLOCK, Driven, DriveOnBus, bus_spec, device, driven_bus
+from drive_on_bus import CLOCK, Driven, DriveOnBus, bus_spec, device
+from waiting import until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -17,12 +17,6 @@ from winchkit.drivers.can.cia402.state_machine import DriveState, RequestedState
 from winchkit.errors import NotPermitted
 
 HOST, HEARTBEAT = 127, 0.05
-
-
-@pytest.fixture
-def rig() -> Iterator[Driven]:
-    with driven_bus() as made:
-        yield made
 
 
 def axis_on(
@@ -128,10 +122,7 @@ def test_a_host_that_falls_silent_is_noticed_afterwards(rig: Driven) -> None:
     axis = axis_on(bus)
     axis.commission()
     bus.heartbeat(HOST, 5)
-    deadline = time.monotonic() + 3.0
-    while not axis.emergencies:
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+    until(lambda: bool(axis.emergencies), 3.0)
     assert axis.emergencies[0].code == 0x8130
 
 

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.realtime
 
 
 def scanned(bus: object) -> dict[int, ScannedNode]:
-    return {item.node: item for item in scan(bus, SPEC, MonotonicClock(), 0.3)}  # type: ignore[arg-type]
+    return {item.node: item for item in scan(bus, SPEC, MonotonicClock(), listen=0.3)}  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -155,11 +155,7 @@ class CanBus:
         self._port.close()
 
     def reopen(self) -> None:
-        """Open the interface anew after it went down; raises ConnectionLost.
-
-        Nodes, handlers and counts stay. Nothing is sent: drives keep the state that they are in,
-        and whoever wants to move them has to set them up again.
-        """
+        """Open the interface anew, with its handlers; sends nothing. Raises ConnectionLost."""
         self.close()
         try:
             self._open()
@@ -226,10 +222,7 @@ class CanBus:
         self._handlers[identifier] = handler
 
     def on_foreign(self, identifier: int, handler: Handler) -> None:
-        """Call ``handler`` too for every frame with this identifier that was not sent here.
-
-        Other frames of the bus cost nothing by it: no interface hands back what was sent here.
-        """
+        """Call ``handler`` too for every frame with this identifier that was not sent here."""
         handlers = self._foreign.setdefault(identifier, [])
         if handler not in handlers:
             handlers.append(handler)
@@ -274,10 +267,7 @@ class CanBus:
         self._gathered = []
 
     def post(self, identifier: int, data: bytes) -> None:
-        """Send a frame, together with others of the cycle while they are gathered.
-
-        Raises ConnectionLost where it is sent at once.
-        """
+        """Send a frame, with others of the cycle while they are gathered; as :meth:`send`."""
         if self._gathered is None:
             self.send(identifier, data)
         else:
@@ -320,10 +310,7 @@ class CanBus:
         return count
 
     def remote(self, identifier: int) -> None:
-        """Send a remote frame, to which a node answers with one byte; raises ConnectionLost.
-
-        A full queue is dealt with as in :meth:`send`.
-        """
+        """Send a remote frame, to which a node answers with one byte; as :meth:`send`."""
         port = self._port
         try:
             with self.network.send_lock:

@@ -53,10 +53,7 @@ _new = tuple.__new__
 
 
 class ReceivedFrame(NamedTuple):
-    """A frame as received: of 11 bits and with data, or an error frame.
-
-    A named tuple, since thousands of them are made a second.
-    """
+    """A frame of 11 bits with data, or an error frame; a named tuple: thousands come a second."""
 
     identifier: int
     data: bytes
@@ -207,11 +204,7 @@ def _memory(size: int) -> tuple[bytearray, int]:
 def parse_socketcan(
     data: bytes | bytearray, control: bytes | bytearray
 ) -> tuple[ReceivedFrame | None, int | None]:
-    """A ``struct can_frame`` with its control messages: the frame, and the count of drops.
-
-    None in place of a frame of 29 bits, a remote frame or a fragment; None in place of a count
-    that the kernel did not send.
-    """
+    """A frame of 11 bits with data, or None, and the count of drops, or None where it has none."""
     stamp, drops = _told(control, 0, len(control))
     if len(data) < _FRAME.size:
         return None, drops

@@ -33,10 +33,7 @@ def unmappable(variable: Any, *, receive: bool, real: bool = False) -> str:
 
 
 def fixed_mapping(dictionary: Any, receive: bool, number: int) -> tuple[str, ...] | None:
-    """Objects of a PDO whose mapping the EDS does not let change; None where it does.
-
-    The mapping is changed by writing its sub-index 0 (CiA 301), which some EDS declare const.
-    """
+    """Objects of a PDO whose mapping (its sub-index 0) the EDS declares const, else None."""
     mapping = (_RPDO if receive else _TPDO) + _MAPPING + number - 1
     count = declared(dictionary, mapping)
     if count is None or count.access_type in ("rw", "wo", "rww", "rwr"):

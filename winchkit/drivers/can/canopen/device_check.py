@@ -24,7 +24,7 @@ from winchkit.drivers.can.canopen.description import (
 )
 from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.drivers.can.canopen.pdo import parse_object
-from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.canopen.pdo_parameters import IDENTIFIER, INVALID, cob_id
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.option_codes import OPTIONS
 from winchkit.errors import Fault, FileError
@@ -37,7 +37,6 @@ from winchkit.schema.reading.source import open_source
 
 _NODE = 1
 """For which the EDS is read: $NODEID of its identifiers."""
-_INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _CONTROL = (0x6040, 0)
 _OBJECTS = {
     "heartbeat": "a writable 1016h:1",
@@ -155,10 +154,7 @@ def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
 
 
 def host_loss_problem(ways: tuple[HostLossObjects, ...], way: str) -> str:
-    """Why a drive cannot notice a dead host in a declared way; empty where its EDS allows it.
-
-    A maker's own way (``vendor:``) and hardware that stops the drive are not in an EDS.
-    """
+    """Why a drive cannot notice a dead host as declared, by its EDS; empty where it may."""
     names = [one.way for one in ways]
     if way in names or way == HARDWARE or way.startswith(VENDOR):
         return ""
@@ -213,11 +209,11 @@ def _communication_faults(dictionary: Any, record: int, kind: str, spec: PdoSpec
     kept = configured_value(identifier)
     wanted = cob_id("rpdo" if kind == "rpdo" else "tpdo", spec.number, _NODE)
     if identifier is not None and not identifier.writable and kept is not None:
-        if kept & _INVALID:
+        if kept & INVALID:
             yield f"{kind} {spec.number} is not in use: {record:04X}h:1 cannot be written"
-        elif kept & _IDENTIFIER != wanted:
+        elif kept & IDENTIFIER != wanted:
             yield (
-                f"{kind} {spec.number} has the identifier {kept & _IDENTIFIER:03X}h at node "
+                f"{kind} {spec.number} has the identifier {kept & IDENTIFIER:03X}h at node "
                 f"{_NODE}, which cannot be written, not {wanted:03X}h of the predefined "
                 "connection set"
             )

@@ -1,7 +1,4 @@
-"""NMT of CiA 301: commands and states in words, heartbeat consumer and producer.
-
-The caller gives the time to both.
-"""
+"""NMT of CiA 301: commands and states in words, heartbeat consumer and producer."""
 
 from __future__ import annotations
 
@@ -25,26 +22,32 @@ class NmtState(IntEnum):
 
 NMT_STATES = frozenset(int(state) for state in NmtState)
 """State bytes of CiA 301."""
-_COMMANDS = {
-    0x01: "start",
-    0x02: "stop",
-    0x80: "enter pre-operational",
-    0x81: "reset node",
-    0x82: "reset communication",
+
+
+class NmtCommand(IntEnum):
+    """NMT command specifier."""
+
+    START = 0x01
+    STOP = 0x02
+    ENTER_PRE_OPERATIONAL = 0x80
+    RESET_NODE = 0x81
+    RESET_COMMUNICATION = 0x82
+
+
+_WORDS = {
+    int(command): command.name.lower().replace("_", " ").replace("pre ", "pre-")
+    for command in NmtCommand
 }
 
 
 def state_text(state: int) -> str:
-    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have.
-
-    The byte is the device's own: one that the standard does not know must not end a loop.
-    """
+    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have."""
     return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
 
 def command_text(command: int) -> str:
     """NMT command specifier in words; the number of one that CiA 301 does not have."""
-    return _COMMANDS.get(command, f"unknown ({command:02X}h)")
+    return _WORDS.get(command, f"unknown ({command:02X}h)")
 
 
 @dataclass
@@ -84,10 +87,7 @@ class HeartbeatConsumer:
 
 @dataclass
 class HeartbeatProducer:
-    """Times of the host's heartbeat.
-
-    The control loop evaluates it once per cycle, so that the heartbeat ends with the loop.
-    """
+    """Times of the host's heartbeat, asked for by the control loop so that it ends with that."""
 
     period: float
     """s."""

@@ -259,10 +259,7 @@ class SdoNode:
             raise
 
     def write(self, index: int, sub: int, value: int) -> None:
-        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range.
-
-        A negative value goes as the two's complement of the object's size.
-        """
+        """Write an integer object; raises NoReply, DeviceRefused, NotPermitted for its range."""
         item = self._variable(index, sub, 4)
         try:
             data = value.to_bytes(item.bits // 8, "little", signed=value < 0 or item.signed)

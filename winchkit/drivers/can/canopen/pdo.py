@@ -10,6 +10,8 @@ from typing import Any
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.servo import PdoSpec
 
+Key = tuple[int, int]
+"""Index and sub-index of an object."""
 _CHARACTER = {(8, False): "B", (16, False): "H", (32, False): "I", (64, False): "Q"}
 _CHARACTER |= {(bits, True): char.lower() for (bits, _), char in list(_CHARACTER.items())}
 
@@ -29,7 +31,7 @@ class MappedObject:
         return self.index << 16 | self.sub << 8 | self.bits
 
 
-def parse_object(text: str) -> tuple[int, int]:
+def parse_object(text: str) -> Key:
     """Index and sub-index of ``"0x6091:1"``; raises FileError."""
     index, _, sub = text.partition(":")
     try:
@@ -69,7 +71,7 @@ class PdoCodec:
 
 def joint_layout(
     codecs: Sequence[PdoCodec],
-) -> tuple[Callable[[bytes], tuple[Any, ...]], tuple[tuple[int, int], ...]]:
+) -> tuple[Callable[[bytes], tuple[Any, ...]], tuple[Key, ...]]:
     """How to unpack the frames of several PDOs at once, joined by number, and their objects."""
     ordered = sorted(codecs, key=lambda codec: codec.spec.number)
     layout = struct.Struct("<" + "".join(codec.layout for codec in ordered))

@@ -12,12 +12,13 @@ from winchkit.schema.devices.servo import PdoSpec
 
 Direction = Literal["tpdo", "rpdo"]
 
-INVALID = 1 << 31
+INVALID, IDENTIFIER = 1 << 31, 0x7FF
+"""Bits of a COB-ID (CiA 301): what is not used, and the CAN-ID."""
 _NO_RTR = 1 << 30
 COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
 MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
 _FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
-_PREDEFINED = range(1, 5)
+PREDEFINED = range(1, 5)
 MOST_PDOS = 512
 """In each direction (CiA 301: 1400h to 15FFh, 1800h to 19FFh)."""
 _INHIBIT_UNIT, _MS = 1e-4, 1e-3
@@ -38,12 +39,9 @@ def codecs(node: SdoNode, specs: Iterable[PdoSpec]) -> tuple[PdoCodec, ...]:
 
 
 def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) -> None:
-    """Map ``wanted`` and switch every other PDO of this direction off, those beyond four too.
-
-    The node must be pre-operational. Raises NoReply, DeviceRefused.
-    """
+    """Map ``wanted`` on a pre-operational node and switch every other PDO of this direction off."""
     by_number = {codec.spec.number: codec for codec in wanted}
-    for number in (*_PREDEFINED, *_beyond(node, direction)):
+    for number in (*PREDEFINED, *_beyond(node, direction)):
         record = COMMUNICATION[direction] + number - 1
         codec = by_number.get(number)
         if codec is not None:
@@ -64,7 +62,7 @@ def _beyond(node: SdoNode, direction: Direction) -> list[int]:
     first = COMMUNICATION[direction]
     return [
         number
-        for number in range(_PREDEFINED.stop, MOST_PDOS + 1)
+        for number in range(PREDEFINED.stop, MOST_PDOS + 1)
         if first + number - 1 in node.dictionary
     ]
 

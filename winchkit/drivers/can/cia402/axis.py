@@ -8,7 +8,7 @@ from pathlib import Path
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
-from winchkit.drivers.can.canopen.nmt import NmtState, state_text
+from winchkit.drivers.can.canopen.nmt import NmtCommand, NmtState, state_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.command import Commander, CycleCommand
@@ -38,6 +38,7 @@ from winchkit.drivers.can.cia402.profile_parameters import (
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.second_master import SecondMaster
 from winchkit.drivers.can.cia402.state_machine import (
+    POWERED,
     QUICK_STOP,
     DriveState,
     RequestedState,
@@ -53,17 +54,10 @@ _STALE_SYNCS, _STALE_BEATS = 5, 2
 """Feedback that is older than both of these does not show the drive's state any more."""
 _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
-_NMT_STOP = 0x02
-"""NMT command specifier "stop remote node" (CiA 301)."""
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
 _RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)
 _OPERATIONAL = int(NmtState.OPERATIONAL)
-_POWERED = (
-    DriveState.OPERATION_ENABLED,
-    DriveState.QUICK_STOP_ACTIVE,
-    DriveState.FAULT_REACTION_ACTIVE,
-)
 
 
 class Cia402Axis:
@@ -182,7 +176,7 @@ class Cia402Axis:
 
     def stop_by_nmt(self) -> None:
         """NMT stop; raises ConnectionLost."""
-        self._bus.nmt(_NMT_STOP, self._node.node)
+        self._bus.nmt(NmtCommand.STOP, self._node.node)
 
     def end_stop(self) -> None:
         """End the stop by SDO: its replies go to the confirmed client again."""
@@ -256,10 +250,7 @@ class Cia402Axis:
 
     @property
     def trim_angle(self) -> float:
-        """Angle that corrections of the cable force have turned since the last homing, rad.
-
-        The record of the position has it too.
-        """
+        """Angle that corrections of the cable force have turned since the last homing, rad."""
         return self._position.trim
 
     @trim_angle.setter
@@ -291,10 +282,7 @@ class Cia402Axis:
         self._position.note_zero(doubt)
 
     def define_position(self, angle: float) -> None:
-        """Let the disabled motor have an angle (rad), by a zero that the record keeps.
-
-        Raises NotPermitted while it moves, and where the drive itself limits its position.
-        """
+        """Let the disabled motor have an angle (rad), by a zero that the record keeps."""
         self._disabled_drive("define its position")
         self._require_unlimited()
         self._position.define(angle)
@@ -321,10 +309,7 @@ class Cia402Axis:
         self.host.disarm()
 
     def fall_silent(self) -> bool:
-        """End the life signs that the drive watches, until it is commissioned again.
-
-        Returns whether SYNC is one of them, which the control loop has to end.
-        """
+        """End the life signs that the drive watches; returns whether SYNC is one of them."""
         self.host.silent = True
         return self.host.mechanism.silence in (Silence.SYNC, Silence.ALL)
 
@@ -491,11 +476,7 @@ class Cia402Axis:
         self._position.changed_mode(previous, mode)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
-        """Set a homing up and change to HM, disabled; ``send`` with ENABLE and ``start`` runs it.
-
-        Afterwards ``switch_mode(servo.motion_mode)`` leads back. Raises NotPermitted, NoReply,
-        DeviceRefused.
-        """
+        """Set a homing up and change to HM, disabled; ``send`` with ``start`` runs it."""
         drive = self._disabled_drive("prepare a homing")
         set_homing(self._node, self.servo, drive.scale, homing)
         self.switch_mode("HM")
@@ -511,11 +492,7 @@ class Cia402Axis:
         set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
 
     def set_quick_stop(self, acceleration: float | None = None) -> None:
-        """Set the ramp of quick stops (rad/s^2), None for that of commissioning, before a motion.
-
-        Nothing is sent where the drive has it already. Raises NotPermitted, NoReply,
-        DeviceRefused.
-        """
+        """Set the ramp of quick stops (rad/s²), None for that of commissioning, before a motion."""
         wanted = self._watch.quick_stop if acceleration is None else acceleration
         if self.drive is None or wanted == self._quick_stop:
             return
@@ -539,7 +516,7 @@ class Cia402Axis:
     def _disabled_drive(self, what: str) -> Commissioned:
         if self.drive is None:
             raise NotPermitted(f"{self.name}: commission the drive before you {what}")
-        if self.state in _POWERED or not self.at_rest:
+        if self.state in POWERED or not self.at_rest:
             raise NotPermitted(
                 f"{self.name}: cannot {what} while the drive is {self.state} and "
                 f"{'at rest' if self.at_rest else 'moving'}; stop it first"

@@ -8,6 +8,7 @@ from itertools import accumulate, islice
 from typing import NamedTuple
 
 from winchkit.drivers.can.canopen.node import object_name
+from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
@@ -57,8 +58,6 @@ class SetPoint:
             self._offered, self._step = target, _Handshake.PLACED
         return (START | AT_ONCE if self._step is _Handshake.RAISED else 0), self._offered
 
-
-Key = tuple[int, int]
 
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B1, 0), (0x60B2, 0)
@@ -161,10 +160,7 @@ class Commander:
         return word, self._packed(values)
 
     def stop_frames(self) -> list[tuple[int, bytes]]:
-        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets.
-
-        In quick stop the drive makes its own ramp, and no target counts (CiA 402-2).
-        """
+        """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets."""
         values = self._zeros.copy()
         for place in self._controls:
             values[place] = QUICK_STOP

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtCommand, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
-from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
+from winchkit.drivers.can.canopen.pdo_parameters import INVALID, codecs, set_up
 from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_limits
 from winchkit.drivers.can.cia402.modes import MODES, change_mode, supported_modes
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
@@ -25,8 +25,6 @@ from winchkit.schema.devices.servo import OptionSpec, ServoSpec
 _SYNC, _EMCY = 0x080, 0x080
 _PRODUCES = 1 << 30
 """Of 1005h: the device sends SYNC itself."""
-_INVALID = 1 << 31
-"""Of 1014h: no EMCY is sent."""
 _IDENTIFIER = 0x1FFFFFFF
 """Bits 0 to 28 of 1005h and 1014h (CiA 301): CAN-ID, with those of extended frames."""
 
@@ -66,17 +64,17 @@ def _sync(node: SdoNode) -> tuple[str, ...]:
 def _emergency(node: SdoNode) -> tuple[str, ...]:
     kept = node.read_if_there(0x1014)
     wanted = _EMCY + node.node
-    if kept is None or kept & (_INVALID | _IDENTIFIER) == wanted:
+    if kept is None or kept & (INVALID | _IDENTIFIER) == wanted:
         return ()
     place = node.place(0x1014)
     try:
-        node.write(0x1014, 0, kept | _INVALID)
-        node.write(0x1014, 0, wanted | _INVALID)
+        node.write(0x1014, 0, kept | INVALID)
+        node.write(0x1014, 0, wanted | INVALID)
         node.write(0x1014, 0, wanted)
         now = node.read(0x1014)
     except DeviceRefused:
         now = kept
-    if now & (_INVALID | _IDENTIFIER) != wanted:
+    if now & (INVALID | _IDENTIFIER) != wanted:
         return (f"{place} is {kept:X}h and cannot be set to {wanted:X}h: its EMCY is not received",)
     return (f"{place} was {kept:X}h, EMCY was not received; it is {wanted:X}h now",)
 
@@ -134,8 +132,6 @@ def _kept(node: SdoNode) -> float | None:
     return float(value * 10.0**exponent)
 
 
-_START, _PRE_OPERATIONAL = 0x01, 0x80
-"""NMT command specifiers "start remote node" and "enter pre-operational" (CiA 301)."""
 _STOP_TIME = 3.0
 """s: three times the quick stop from 1 m/s with 1 m/s² (rule of thumb); tenfold, a drive that does
 not stop would be reported after half a minute."""
@@ -232,7 +228,7 @@ def commission(
     Raises NoReply, DeviceRefused, and NotPermitted where the drive could not be moved safely.
     """
     _bring_to_rest(node, servo, clock)
-    node.bus.nmt(_PRE_OPERATIONAL, node.node)
+    node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
     notes = set_communication(node)
     mode = servo.motion_mode
     modes = supported_modes(node, servo, mode)
@@ -252,7 +248,7 @@ def commission(
         # The drive's own ramps must not come in the way of those that the host makes.
         set_profile(node, servo, scale, acceleration=watch.acceleration)
     node.require_alone()
-    node.bus.nmt(_START, node.node)
+    node.bus.nmt(NmtCommand.START, node.node)
     loss = host.reaction(None, options, seen=watch.seen_stopping)
     stops = watch.stops_on_nmt
     return Commissioned(
@@ -301,17 +297,13 @@ def await_booted(
                         "switch the drive off and on"
                     ) from error
                 raise
-            node.bus.nmt(_PRE_OPERATIONAL, node.node)
+            node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         else:
             return
 
 
 def _set_error_behaviour(node: SdoNode) -> int | None:
-    """Have the drive leave operational when the host is gone (1029h:1 = 0).
-
-    Returns what it keeps: 0 pre-operational, 2 stopped, 1 no change where it takes nothing else,
-    None without such an object. Raises NoReply, DeviceRefused.
-    """
+    """Have the drive leave operational when the host is gone; returns its 1029h:1, None without."""
     kept = node.read_if_there(0x1029, 1)
     if kept == 1 and node.writes(0x1029, 1):
         node.write(0x1029, 1, 0)

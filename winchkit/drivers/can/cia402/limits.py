@@ -43,11 +43,7 @@ class DriveLimits:
 
 
 def set_limits(node: SdoNode, scale: CountScale, wanted: LimitsAtShaft) -> DriveLimits:
-    """Write the limits that are given and read all of them back.
-
-    Raises NotPermitted for a limit that the drive has no object for, DeviceRefused for one that
-    it does not keep, NoReply.
-    """
+    """Write the given limits, read all back; raises NotPermitted without an object for one."""
     for index, sub, counts in _counts(scale, wanted):
         if node.read_if_there(index, sub) is None:
             raise NotPermitted(

@@ -8,18 +8,16 @@ from enum import Enum
 from functools import cached_property
 
 from winchkit.drivers.can.canopen.node import SdoNode
+from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.cia402.state_machine import StatusBit
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-Key = tuple[int, int]
-
 START = 1 << 4
 """Control bit 4: new set-point in PP, start in HM, follow in IP."""
 AT_ONCE = 1 << 5
 """Control bit 5 in PP: do not finish the move under way first."""
-ACCELERATION = (0x6083, 0x6084)
 
 _REACHED, _LIMIT = StatusBit.TARGET_REACHED, StatusBit.INTERNAL_LIMIT
 _BIT_12, _BIT_13 = 1 << 12, 1 << 13
@@ -100,10 +98,7 @@ def mode_named(number: int) -> str:
 
 
 def status_words(mode: str, status: int) -> tuple[str, ...]:
-    """The bits of a status word that are set beside the state, in words, for a mode.
-
-    ``mode``: a name; for another text those bits that have one meaning in all modes.
-    """
+    """Bits of a status word beside the state, in words; without a mode those that all share."""
     common = {
         int(StatusBit.WARNING): "warning",
         int(_LIMIT): "internal limit active",

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from winchkit.drivers.can.canopen.node import SdoNode, object_name
+from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
 from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
@@ -19,9 +20,6 @@ from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.standstill import Standstill
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.servo import ServoSpec
-
-Key = tuple[int, int]
-"""Index and sub-index of an object."""
 
 _POSITION, _HEARTBEAT, _SERIAL = (0x6064, 0), (0x1017, 0), (0x1018, 4)
 _POLARITY, _REVERSED = (0x607E, 0), 0x80
@@ -159,10 +157,7 @@ class MotorPosition:
         )
 
     def look(self, node: SdoNode) -> None:
-        """Look for signs of a power cycle; before the set-up writes anything.
-
-        Raises NoReply, DeviceRefused.
-        """
+        """Look for signs of a power cycle; before the set-up writes anything."""
         before = self._objects
         if self.counter is None:
             before = {} if self._kept is None else self._kept.objects

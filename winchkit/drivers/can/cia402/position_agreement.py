@@ -178,10 +178,7 @@ class PositionAgreement:
         self.restart()
 
     def take(self, time: float, angle: float, velocity: float) -> bool:
-        """Take a feedback (s, rad, rad/s); whether the two disagree by now.
-
-        An unknown speed (NaN) can be compared with nothing.
-        """
+        """Take a feedback (s, rad, rad/s); whether the two disagree by now."""
         if not self._active:
             return False
         then, _, integral, slack, before = self._last

@@ -79,10 +79,7 @@ class PositionCounter:
         return self._kept is None
 
     def restart(self, doubt: str) -> None:
-        """Begin anew with a drive that has restarted; ``doubt`` says what became of its count.
-
-        A count that had crossed the end says nothing any more in any case.
-        """
+        """Begin anew with a drive that has restarted; ``doubt`` says what became of its count."""
         if doubt or self.offset:
             self.lose(doubt or "6064h had wrapped before the drive restarted")
         self.offset, self.last, self.time = 0, inf, -inf

@@ -46,10 +46,7 @@ def set_profile(
     speed: float | None = None,
     acceleration: float | None = None,
 ) -> None:
-    """Set speed (6081h, rad/s) and ramps (6083h, 6084h, rad/s^2) of the profile modes.
-
-    Raises NotPermitted, NoReply, DeviceRefused.
-    """
+    """Set speed (6081h, rad/s) and ramps (6083h, 6084h, rad/s²) of the profile modes."""
     if speed is not None:
         node.write_verified(0x6081, 0, scale.velocity_counts(_positive(speed, "speed", "rad/s")))
     if acceleration is not None:
@@ -60,10 +57,7 @@ def set_profile(
 
 
 def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: CountScale, acceleration: float) -> None:
-    """Set the ramp of quick stops (6085h, rad/s^2) and read it back.
-
-    Raises NotPermitted where a quick stop does not use it (605Ah), NoReply, DeviceRefused.
-    """
+    """Set the ramp of quick stops (6085h, rad/s²); raises NotPermitted if 605Ah ignores it."""
     option = node.read_if_there(0x605A)
     if option not in _BY_RAMP or node.read_if_there(0x6085) is None:
         raise NotPermitted(
@@ -74,19 +68,13 @@ def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: CountScale, accelerat
 
 
 def keeps_zero(node: SdoNode, servo: ServoSpec) -> bool:
-    """Whether a drive has the objects by which a homing gives the present place a position.
-
-    Raises NoReply, DeviceRefused.
-    """
+    """Whether a drive has the objects by which a homing gives the present place a position."""
     needed = ((0x6098, 0), parse_object(servo.home_offset))
     return all(node.read_if_there(*key) is not None for key in needed)
 
 
 def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec) -> None:
-    """Read every object that a homing needs, before anything is written or moves.
-
-    Raises NotPermitted naming what the drive lacks, NoReply, DeviceRefused.
-    """
+    """Read every object that a homing needs, before anything moves; raises NotPermitted."""
     if homing.method not in METHODS:
         raise NotPermitted(f"{node.place(0x6098)}: there is no homing method {homing.method}")
     needed = [(0x6098, 0)]

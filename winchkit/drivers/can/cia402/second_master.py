@@ -13,13 +13,12 @@ from functools import partial
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import command_text
 from winchkit.drivers.can.canopen.node import SdoNode
-from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.canopen.pdo_parameters import IDENTIFIER, INVALID, cob_id
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP
 
 _NMT, _SDO_REQUEST, _HEARTBEAT = 0x000, 0x600, 0x700
 _FURTHER_SERVERS = range(0x1201, 0x1280)
 _RPDOS = range(0x1400, 0x1600)
-_INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
 """Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
 _HEAD = 4
@@ -30,10 +29,7 @@ _QUICK_STOP = QUICK_STOP.to_bytes(2, "little")
 
 
 class SecondMaster:
-    """Commands to one drive from another master on the bus of a bench.
-
-    It listens from the beginning on; no interface hands back what is sent from here.
-    """
+    """Commands to one drive from another master; no interface hands back what is sent from here."""
 
     def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int], host: int) -> None:
         """Listen to the commands to ``node``; ``rpdos`` are the numbers of its RPDOs in use.
@@ -60,8 +56,8 @@ class SecondMaster:
         for record in _FURTHER_SERVERS:
             if record in node.dictionary:
                 identifier = node.read_if_there(record, 1)
-                if identifier is not None and not identifier & _INVALID:
-                    self._bus.on_foreign(identifier & _IDENTIFIER, self._take_sdo)
+                if identifier is not None and not identifier & INVALID:
+                    self._bus.on_foreign(identifier & IDENTIFIER, self._take_sdo)
 
     def hear_further_rpdos(self, node: SdoNode) -> None:
         """Listen to the RPDOs that could not be switched off; raises NoReply, DeviceRefused."""
@@ -70,9 +66,9 @@ class SecondMaster:
             if number in self._rpdos or record not in node.dictionary or node.writes(record, 1):
                 continue
             identifier = node.read_if_there(record, 1)
-            if identifier is not None and not identifier & _INVALID:
+            if identifier is not None and not identifier & INVALID:
                 self._rpdos.add(number)
-                self._bus.on_foreign(identifier & _IDENTIFIER, partial(self._take_rpdo, number))
+                self._bus.on_foreign(identifier & IDENTIFIER, partial(self._take_rpdo, number))
 
     def forget(self) -> None:
         """A reset has shown it."""

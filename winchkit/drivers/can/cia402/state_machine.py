@@ -28,18 +28,26 @@ class DriveState(IntEnum):
 
 
 _STATE_WORDS = tuple(state.name.lower().replace("_", " ") for state in DriveState)
+POWERED = (
+    DriveState.OPERATION_ENABLED,
+    DriveState.QUICK_STOP_ACTIVE,
+    DriveState.FAULT_REACTION_ACTIVE,
+)
+"""States in which the power stage may turn the motor."""
+FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+
+
+def has_left(state: DriveState) -> bool:
+    """Whether a drive is known not to be in operation enabled; an unknown state proves nothing."""
+    return state not in (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
 
 
 class StatusBit(IntEnum):
     """Bits of the status word 6041h beside the state."""
 
-    VOLTAGE_ENABLED = 1 << 4
     WARNING = 1 << 7
-    REMOTE = 1 << 9
     TARGET_REACHED = 1 << 10
     INTERNAL_LIMIT = 1 << 11
-    FOLLOWS_COMMAND = 1 << 12
-    """In cyclic modes."""
 
 
 class RequestedState(Enum):

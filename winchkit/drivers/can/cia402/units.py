@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, nan, pi
 
@@ -95,23 +96,23 @@ class UnitObjects:
     """6075h, A."""
 
 
-def read_units(node: SdoNode) -> UnitObjects:
-    """Read everything that says something of units; raises NoReply, DeviceRefused."""
+def units_by(read: Callable[[int, int], int | None]) -> UnitObjects:
+    """Everything that says something of units, by what reads an object or has none."""
 
     def ratio(index: int) -> float | None:
-        above, below = node.read_if_there(index, 1), node.read_if_there(index, 2)
+        above, below = read(index, 1), read(index, 2)
         return above / below if above and below else None
 
     def milli(index: int) -> float | None:
-        value = node.read_if_there(index)
+        value = read(index, 0)
         return value * 1e-3 if value else None
 
     return UnitObjects(
         encoder=ratio(0x608F),
         gear=ratio(0x6091),
         feed=ratio(0x6092),
-        position=node.read_if_there(0x60A8),
-        velocity=node.read_if_there(0x60A9),
+        position=read(0x60A8, 0),
+        velocity=read(0x60A9, 0),
         rated_torque=milli(0x6076),
         rated_current=milli(0x6075),
     )
@@ -161,7 +162,7 @@ def _declared(text: str, of: str, increment: float, encoder: float) -> float:
 def read_scale(node: SdoNode, servo: ServoSpec) -> CountScale:
     """Scale of a drive; raises NotPermitted, NoReply, DeviceRefused."""
     try:
-        return scale_of(read_units(node), servo)
+        return scale_of(units_by(node.read_if_there), servo)
     except NotPermitted as error:
         raise NotPermitted(f"{node.place(0x608F, 1)}: {error}") from error
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from winchkit.drivers.can.canopen.pdo import PdoCodec
-from winchkit.drivers.can.canopen.pdo_parameters import cob_id
+from winchkit.drivers.can.canopen.pdo_parameters import INVALID, cob_id
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
 
@@ -11,7 +11,6 @@ RPDO_TIMEOUT = 0x8250
 """EMCY error code of CiA 301."""
 _US = 1e-6
 """s: unit of 1006h."""
-_INVALID = 1 << 31
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _POSITIONS = ((0x607A, 0), (0x60C1, 1))
 
@@ -47,9 +46,9 @@ class RpdoTimeout(Mechanism):
 
     def _set(self, milliseconds: int) -> None:
         record, identifier = self._record, self.node.read(self._record, 1)
-        self.node.write(record, 1, identifier | _INVALID)
+        self.node.write(record, 1, identifier | INVALID)
         self.node.write_verified(record, 5, milliseconds)
-        self.node.write(record, 1, identifier & ~_INVALID)
+        self.node.write(record, 1, identifier & ~INVALID)
 
     def _send(self) -> None:
         codec = self._codec

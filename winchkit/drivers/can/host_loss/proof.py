@@ -6,12 +6,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from winchkit.drivers.can.canopen.emergency import Emergency
-from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtCommand, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.option_codes import BY_6007, OptionCode
 from winchkit.drivers.can.cia402.state_machine import (
     DISABLE_VOLTAGE,
     FAULT_RESET,
+    FAULTS,
     DriveState,
     state_of,
 )
@@ -20,7 +21,6 @@ from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NoReply, NotPermitted
 
-_PRE_OPERATIONAL, _START = 0x80, 0x01
 _TIMEOUT = 0.4
 """For its answer beyond its limit, s."""
 _GUARDED_TIMEOUT = 0.1
@@ -29,7 +29,6 @@ _SETTLING = 1.0
 """s: for the transition after a fault reset or a quick stop at rest; drives take some tenths."""
 _POLL = 0.002
 """s: resolution of the measured delay, 2 % of the shortest limit (0.1 s)."""
-_FAULTS = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 _STOPPING = (1, 2, 3)
 """Of 6007h: fault, disable voltage, quick stop."""
 
@@ -80,7 +79,7 @@ def prove(
     """
     node = mechanism.node
     # A fault that stood before is no evidence, and the operator's to look at and to reset.
-    faultless = state_of(node.read(0x6041)) not in _FAULTS
+    faultless = state_of(node.read(0x6041)) not in FAULTS
     try:
         limit = mechanism.withhold()
         start = mechanism.clock.now()
@@ -88,10 +87,10 @@ def prove(
     finally:
         mechanism.release()
         # A drive that stopped (1029h:1 = 2) answers SDO only once it is pre-operational.
-        node.bus.nmt(_PRE_OPERATIONAL, node.node)
+        node.bus.nmt(NmtCommand.ENTER_PRE_OPERATIONAL, node.node)
         mechanism.restore()
     state = state_of(node.read(0x6041))
-    if faultless and state in _FAULTS:
+    if faultless and state in FAULTS:
         proof = replace(proof, fault=True, noticed=True)
     bring_back(node, mechanism.clock, clears=faultless)
     if not proof.noticed and mechanism.noticed_disabled:
@@ -139,7 +138,7 @@ def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
         node.write(0x6040, 0, FAULT_RESET)
         _await_state(node, clock, DriveState.SWITCH_ON_DISABLED)
         node.write(0x6040, 0, DISABLE_VOLTAGE)
-    node.bus.nmt(_START, node.node)
+    node.bus.nmt(NmtCommand.START, node.node)
 
 
 def _await_reaction(
@@ -176,7 +175,7 @@ def _fits(mechanism: Mechanism, emergency: Emergency) -> bool:
 def _shows_fault(node: SdoNode) -> bool:
     """Whether the silent drive is in fault; one that answers no SDO shows nothing."""
     try:
-        return state_of(node.read(0x6041)) in _FAULTS
+        return state_of(node.read(0x6041)) in FAULTS
     except NoReply:
         return False
 

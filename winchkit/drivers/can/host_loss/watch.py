@@ -49,10 +49,7 @@ class HostWatch:
         self._begun = 0
 
     def set_up(self) -> None:
-        """Write the mechanism's objects, in the state pre-operational, PDOs mapped.
-
-        Raises NotPermitted where the drive lacks what it needs, NoReply, DeviceRefused.
-        """
+        """Write the mechanism's objects, pre-operational, PDOs mapped; raises NotPermitted."""
         self._polls = None
         self.silent = False
         self.mechanism = self._chosen()

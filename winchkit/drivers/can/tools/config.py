@@ -19,12 +19,11 @@ from canopen.objectdictionary import ODVariable, datatypes
 
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.node import Objects, Value, object_name, variables
+from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.cia402.state_machine import DriveState, state_of
 from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
-
-Key = tuple[int, int]
 
 STORE, RESTORE = (0x1010, b"save"), (0x1011, b"load")
 """Object and signature that store all parameters, and bring back the maker's."""
@@ -121,11 +120,7 @@ def named_setting(dictionary: Any, name: str) -> ODVariable:
 
 
 def one_setting(dictionary: Any, name: str, text: str) -> dict[Key, Value]:
-    """A setting with its value, for a :class:`Config`.
-
-    ``name``: object, e.g. ``6081h``. ``text``: value; whole numbers also as ``0x1F``. Raises
-    UsageError for an unknown setting, and for a value beyond its type or limits.
-    """
+    """A setting from its name, such as ``6081h``, and its value; raises UsageError."""
     item = named_setting(dictionary, name)
     value = _parsed(item, text.strip())
     low, high = _range(item)
@@ -264,10 +259,7 @@ def write_config_file(path: Path, config: Config, eds: Path, node: int, bitrate:
 
 
 def read_config_file(path: Path, dictionary: Any) -> Config:
-    """Read a .json or .dcf file against the drive's dictionary; raises FileError.
-
-    Of a DCF the objects count that are settings and have a ParameterValue.
-    """
+    """Read the settings of a .json or .dcf file against a drive's dictionary; raises FileError."""
     is_json = _is_json(path)
     try:
         text = read_text(path, "utf-8" if is_json else "latin-1")

@@ -14,7 +14,7 @@ from canopen.objectdictionary import datatypes
 from winchkit.drivers.can.canopen.emergency import error_text, parse_emergency
 from winchkit.drivers.can.canopen.nmt import command_text, state_text
 from winchkit.drivers.can.canopen.node import is_signed, object_name, read_dictionary
-from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.canopen.pdo import Key, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import Direction, cob_id
 from winchkit.drivers.can.cia402.modes import mode_named, status_words
 from winchkit.drivers.can.cia402.state_machine import FAULT_RESET, HALT, state_of
@@ -59,10 +59,6 @@ _FIRST_OBJECT = 0x1000
 _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _SEGMENT = 7
 """Data bytes in a segment of an SDO transfer (CiA 301)."""
-
-
-Key = tuple[int, int]
-"""Index and sub-index of an object."""
 
 
 @dataclass(frozen=True)

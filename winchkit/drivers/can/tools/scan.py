@@ -30,6 +30,8 @@ _TOO_MANY = 1.5
 _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _PACE_BITS = 1000
 """Of bus time from one question to the next, so that no adapter's queue overflows."""
+_LISTEN = 1.1
+"""For heartbeats, whose period is a second at most where they are of use, s."""
 _TIMEOUT = 0.3
 """s: shorter than that of a known drive, as most of the 127 node ids do not exist."""
 _DICTIONARY: Any = canopen.ObjectDictionary
@@ -93,8 +95,8 @@ def scan(
     bus: CanBus,
     spec: BusSpec,
     clock: Clock,
-    listen: float,
     own: Mapping[int, Cia402Axis] | None = None,
+    listen: float = _LISTEN,
 ) -> list[ScannedNode]:
     """Ask every node number for its device type and listen for ``listen`` s.
 

@@ -16,20 +16,21 @@ from typing import Any
 from winchkit.can_trace import TraceFrame
 from winchkit.drivers.can.canopen.declared import configured_value
 from winchkit.drivers.can.canopen.node import object_name, read_dictionary, variables
-from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.canopen.pdo import Key, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import (
     COMMUNICATION,
+    IDENTIFIER,
     INVALID,
     MAPPING,
     MOST_PDOS,
+    PREDEFINED,
     Direction,
     cob_id,
 )
 from winchkit.drivers.can.cia402.modes import mode_named
-from winchkit.drivers.can.cia402.units import CountScale, UnitObjects, scale_of
+from winchkit.drivers.can.cia402.units import CountScale, scale_of, units_by
 from winchkit.drivers.can.tools.decode import (
     DecodedFrame,
-    Key,
     KnownNode,
     MappedPdo,
     content_text,
@@ -45,11 +46,9 @@ from winchkit.schema.eds.eds import SUFFIXES
 from winchkit.schema.read import read_device
 
 _DIRECTIONS: tuple[Direction, Direction] = ("tpdo", "rpdo")
-_IDENTIFIER = 0x7FF
 _REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY = 0x600, 0x580, 0x700, 0x080
 _STORE, _MODE = 0x1010, (0x6061, 0)
 _IDENTITY = ((0x1018, 1, "vendor"), (0x1018, 2, "product"))
-_PREDEFINED = range(1, 5)
 
 
 @dataclass(frozen=True)
@@ -73,10 +72,7 @@ class Description:
 
 
 def read_description(path: str) -> Description:
-    """A device file by path or name, or an EDS, DCF, XDD or XDC.
-
-    Raises FileError for a file that cannot be read, and for a device that is on no CAN bus.
-    """
+    """A device file by path or name, or an EDS, DCF, XDD or XDC; raises FileError."""
     if Path(path).suffix.lower() in SUFFIXES:
         read_dictionary(Path(path), 1)
         return Description(path)
@@ -207,23 +203,10 @@ class TracedNode:
         if servo is None:
             return None
 
-        def ratio(index: int) -> float | None:
-            above, below = self.seen.get((index, 1)), self.seen.get((index, 2))
-            return above / below if above and below else None
+        def seen(index: int, sub: int) -> int | None:
+            return None if (index, sub) not in self.seen else int(self.seen[index, sub])
 
-        def code(index: int) -> int | None:
-            return None if (index, 0) not in self.seen else int(self.seen[index, 0])
-
-        units = UnitObjects(
-            encoder=ratio(0x608F),
-            gear=ratio(0x6091),
-            feed=ratio(0x6092),
-            position=code(0x60A8),
-            velocity=code(0x60A9),
-            rated_torque=1e-3 * self.seen.get((0x6076, 0), 0.0) or None,
-            rated_current=1e-3 * self.seen.get((0x6075, 0), 0.0) or None,
-        )
-        return scale_of(units, servo)
+        return scale_of(units_by(seen), servo)
 
     def process_value(self) -> tuple[str, str, float] | None:
         """Name of the object of an instrument's value, its unit, and the value of a count in it."""
@@ -276,7 +259,7 @@ class TraceDecoder:
         """Meaning of a frame; raises FileError for an EDS that does not fit a node's number."""
         identifier, data = frame.identifier, frame.data
         node, base = identifier & 0x7F, identifier & ~0x7F
-        if identifier > _IDENTIFIER:
+        if identifier > IDENTIFIER:
             return DecodedFrame("other", 0, data.hex(" "))
         if base in (_REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY) and node:
             return self._of_service(base, data, self._hear(node), frame)
@@ -336,7 +319,7 @@ def _configured(dictionary: Any) -> dict[Key, float]:
         if variable.index in _PDO_RECORDS and (value := configured_value(variable)) is not None:
             found[variable.index, variable.subindex] = value
     for direction in _DIRECTIONS:
-        for number in _PREDEFINED:
+        for number in PREDEFINED:
             record = COMMUNICATION[direction] + number - 1
             if record in dictionary and dictionary.node_id is not None:
                 found.setdefault((record, 1), cob_id(direction, number, dictionary.node_id))
@@ -364,7 +347,7 @@ def _pdos(values: Mapping[Key, float], node: int) -> dict[int, MappedPdo]:
     found = {}
     for direction in _DIRECTIONS:
         for number in range(1, MOST_PDOS + 1):
-            default = cob_id(direction, number, node) if number in _PREDEFINED else INVALID
+            default = cob_id(direction, number, node) if number in PREDEFINED else INVALID
             identifier = int(values.get((COMMUNICATION[direction] + number - 1, 1), default))
             mapping = MAPPING[direction] + number - 1
             count = int(values.get((mapping, 0), 0))
@@ -373,5 +356,5 @@ def _pdos(values: Mapping[Key, float], node: int) -> dict[int, MappedPdo]:
                 continue
             keys = tuple((entry >> 16, entry >> 8 & 0xFF) for entry in entries)
             sizes = tuple(entry & 0xFF for entry in entries)
-            found[identifier & _IDENTIFIER] = MappedPdo(direction.upper(), number, keys, sizes)
+            found[identifier & IDENTIFIER] = MappedPdo(direction.upper(), number, keys, sizes)
     return found
