@@ -23,10 +23,12 @@ SPEEDS = (0.02, 0.06, 0.2, 0.5, 1.0)
 """rad/s."""
 
 
-def ladder(repeats: int, offset: float, directions: tuple[int, ...] = (1,)) -> list[Run]:
+def ladder(
+    repeats: int, offset: float, directions: tuple[int, ...] = (1,), highest: float = SPEEDS[-1]
+) -> list[Run]:
     random, runs = np.random.default_rng(3), []
     for repeat in range(repeats):
-        for speed in SPEEDS:
+        for speed in (*SPEEDS[:-1], highest):
             for sign in directions:
                 time = np.arange(0.0, 5.0, 0.02)
                 rate = sign * speed * (1 - np.exp(-time / 0.15))
@@ -63,6 +65,16 @@ def test_friction_of_a_speed_ladder_is_no_offset_of_its_runs(
     friction = next(s for s in found.steps if "motor-coulomb" in s.effects)
     first = next(iter(friction.parameters[friction.effects[0]].values()))
     assert COULOMB - 0.5 < first.value < COULOMB + SATURATING + 0.5
+
+
+def test_what_the_friction_leaves_is_no_other_law_of_the_gravity() -> None:
+    """The angle that a run reaches follows its speed, and so does what the friction leaves."""
+    found = found_in(ladder(2, 0.0, (1, -1), highest=4.0))
+    gravity = next(s for s in found.steps if s.effects[0] == "joint-gravity")
+    assert gravity.law == "established"
+    torque = found.outputs["motor_torque"]
+    assert torque.noise_rms is not None
+    assert torque.heldout_rms_after > 2 * torque.noise_rms
 
 
 def test_offsets_between_repeats_are_reported_with_their_size() -> None:
