@@ -66,7 +66,7 @@ def joined(
             if column.name == "time" and column.unit == "s":
                 own = column.values
                 if not np.isfinite(own).any() and table.interval is not None:
-                    own = first + table.interval * np.arange(len(own))
+                    own = np.asarray(first + table.interval * np.arange(len(own)), dtype=float)
                 shifted = own + (start - starts[0][0])
                 found.append(replace(column, values=shifted, texts=None, wrong=()))
             else:
