@@ -24,7 +24,12 @@ from winchkit.diagnosis.data.low_pass import (
     removed_by_low_pass,
 )
 from winchkit.diagnosis.data.motor_current import with_torques
-from winchkit.diagnosis.data.repeats import Repeats, find_repeats, outlying_repeat
+from winchkit.diagnosis.data.repeats import (
+    Repeats,
+    find_repeats,
+    outlying_repeat,
+    separate_repeats,
+)
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count
@@ -66,6 +71,9 @@ class Filtering:
 
 NO_REPEATS = "no-repeats"
 OUTLYING = "outlying-repeat"
+SEPARATED = "separate-repeats"
+_LEAST_SEPARABLE = 4
+"""Repeats from which there can be two sets; theory: of fewer, one has a single run."""
 ROUNDED_ALIKE = "noise-floor-implausible"
 _EQUAL_TEMPERATURE = 0.5
 """Difference of mean temperatures above which repeats may differ by a thermal effect, K."""
@@ -220,7 +228,8 @@ def _prepared(
     runs, coarse = without_constants(runs)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
-    inspected = [inspect_run(run) for run in runs]
+    has_cable = not isinstance(profile, AxisProfile)
+    inspected = [inspect_run(run, has_cable=has_cable) for run in runs]
     sanity = findings(inspected, profile, catalogue)
     resolution = resolutions(inspected)
     runs, mended = evenly_stamped([usable(one) for one in inspected])
@@ -239,6 +248,13 @@ def _prepared(
         left_out.append(outlying[1])
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
+    repeats, apart = _separated(dataset)
+    recordings = _excluded_alike(dataset.recordings, repeats)
+    dataset = replace(dataset, repeats=repeats, recordings=recordings)
+    left_out += apart
+    if nowhere := [r for r in recordings if not any(map(np.any, r.valid.values()))]:
+        what = "has no sample that can be compared: `winchkit check` shows what is left out"
+        raise RunError([Fault(what, r.path or r.name) for r in nowhere])
     anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
     at_speeds = is_setting([motion.motor_rate for motion in dataset.motions])
     zeroed = [
@@ -377,6 +393,53 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
     return None
 
 
+def _separated(dataset: Dataset) -> tuple[tuple[Repeats, ...], list[Finding]]:
+    """The repeats in sets that were made under one value of what is not recorded."""
+    sets: list[Repeats] = []
+    findings = []
+    for group in dataset.repeats:
+        parts, shown = [list(range(len(group.runs)))], ""
+        for output in dataset.outputs if len(group.runs) >= _LEAST_SEPARABLE else ():
+            if len(parts) == 1 and all(
+                output in dataset.recordings[run].measured for run in group.runs
+            ):
+                parts, shown = separate_repeats(_aligned_errors(dataset, group, output)), output
+        for part in parts:
+            rows = tuple(group.rows[i] for i in part)
+            sets.append(Repeats(tuple(group.runs[i] for i in part), rows))
+        if len(parts) > 1:
+            names = (
+                " and ".join(dataset.recordings[group.runs[i]].name for i in part) for part in parts
+            )
+            text = (
+                f"{'; '.join(names)} are sets of repeats that differ from each other as no noise "
+                "does: another zero, load or setting that is not recorded; load_mass states a load"
+            )
+            findings.append(Finding(SEPARATED, "", shown, float(len(parts)), text))
+    return tuple(sets), findings
+
+
+def _excluded_alike(
+    recordings: Sequence[Recording], repeats: Sequence[Repeats]
+) -> tuple[Recording, ...]:
+    """Recordings of which repeats exclude the samples that any of them excludes.
+
+    Else their difference there is what the model leaves, and counts as noise.
+    """
+    out = list(recordings)
+    for group in repeats:
+        for output in OUTPUTS if len(group.runs) > 1 else ():
+            if not all(output in recordings[run].valid for run in group.runs):
+                continue
+            own = zip(group.runs, group.rows, strict=True)
+            common = np.all([recordings[run].valid[output][rows] for run, rows in own], axis=0)
+            for run, rows in zip(group.runs, group.rows, strict=True):
+                valid = out[run].valid[output].copy()
+                valid[rows[~common]] = False
+                out[run] = replace(out[run], valid={**out[run].valid, output: valid})
+    return tuple(out)
+
+
 def assemble(
     runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
@@ -394,7 +457,7 @@ def assemble(
         raw = [decimation.motion(motion) for motion in raw]
         runs = [decimation.run(run) for run in runs]
         signals = [_signals(run, profile) for run in runs]
-    repeats = find_repeats(signals)
+    repeats = find_repeats(signals, [run.load_mass for run in runs])
     smooth = denoised_motions(line, signals, raw, repeats)
     nominal = [line.predict(motion) for motion in raw]
     stands = [
