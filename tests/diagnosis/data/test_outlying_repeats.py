@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import SEPARATED, prepare
-from winchkit.diagnosis.data.repeats import outlying_repeat, separate_repeats
+from winchkit.diagnosis.data.repeats import Repeats, outlying_repeat, separated
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile
 
@@ -51,11 +52,17 @@ def test_two_repeats_show_that_they_differ_and_not_which_one_is_wrong() -> None:
     assert outlying_repeat(np.array([COGGING, HALF_A_TURN_ON])) is None
 
 
+def sets_of(runs: Array) -> list[list[int]]:
+    rows = np.arange(runs.shape[1])
+    group = Repeats(tuple(range(len(runs))), (rows,) * len(runs))
+    return [list(part.runs) for part in separated(group, runs)]
+
+
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (0, 2, 4, 1, 3, 5)])
 def test_repeats_of_three_weights_are_three_sets(order: tuple[int, ...]) -> None:
     random = np.random.default_rng(7)
     runs = np.repeat([1.0, 2.0, 4.0], 2)[:, None] * COGGING + 0.1 * random.standard_normal((6, 512))
-    found = [{order[i] for i in part} for part in separate_repeats(runs[list(order)])]
+    found = [{order[i] for i in part} for part in sets_of(runs[list(order)])]
     assert sorted(map(sorted, found)) == [[0, 1], [2, 3], [4, 5]]
 
 
@@ -64,14 +71,14 @@ def test_noise_alone_is_seldom_separated(colour: float) -> None:
     random = np.random.default_rng(8)
     for _ in range(300):
         noise = lfilter([1.0], [1.0, -colour], random.standard_normal((6, 600)), axis=1)
-        assert len(separate_repeats(noise)) == 1
+        assert len(sets_of(noise)) == 1
 
 
 def test_a_drift_that_the_profile_leaves_many_times_over_separates_nothing() -> None:
     random = np.random.default_rng(9)
     runs = 10 * COGGING + 0.1 * random.standard_normal((4, 512))
     runs[2:] += HALF_A_TURN_ON
-    assert separate_repeats(runs) == [[0, 1, 2, 3]]
+    assert sets_of(runs) == [[0, 1, 2, 3]]
 
 
 def swings(masses: tuple[float, ...], *, stated: bool) -> list[Run]:

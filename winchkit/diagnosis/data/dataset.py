@@ -26,9 +26,10 @@ from winchkit.diagnosis.data.low_pass import (
 from winchkit.diagnosis.data.motor_current import with_torques
 from winchkit.diagnosis.data.repeats import (
     Repeats,
+    excluded_alike,
     find_repeats,
     outlying_repeat,
-    separate_repeats,
+    separated,
 )
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
@@ -72,8 +73,6 @@ class Filtering:
 NO_REPEATS = "no-repeats"
 OUTLYING = "outlying-repeat"
 SEPARATED = "separate-repeats"
-_LEAST_SEPARABLE = 4
-"""Repeats from which there can be two sets; theory: of fewer, one has a single run."""
 ROUNDED_ALIKE = "noise-floor-implausible"
 _EQUAL_TEMPERATURE = 0.5
 """Difference of mean temperatures above which repeats may differ by a thermal effect, K."""
@@ -249,7 +248,8 @@ def _prepared(
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
     repeats, apart = _separated(dataset)
-    recordings = _excluded_alike(dataset.recordings, repeats)
+    alike = excluded_alike(repeats, [r.valid for r in dataset.recordings])
+    recordings = tuple(map(_with_valid, dataset.recordings, alike))
     dataset = replace(dataset, repeats=repeats, recordings=recordings)
     left_out += apart
     if nowhere := [r for r in recordings if not any(map(np.any, r.valid.values()))]:
@@ -393,51 +393,29 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
     return None
 
 
+def _with_valid(recording: Recording, valid: Mapping[str, Mask]) -> Recording:
+    return replace(recording, valid=valid)
+
+
 def _separated(dataset: Dataset) -> tuple[tuple[Repeats, ...], list[Finding]]:
     """The repeats in sets that were made under one value of what is not recorded."""
-    sets: list[Repeats] = []
-    findings = []
-    for group in dataset.repeats:
-        parts, shown = [list(range(len(group.runs)))], ""
-        for output in dataset.outputs if len(group.runs) >= _LEAST_SEPARABLE else ():
-            if len(parts) == 1 and all(
-                output in dataset.recordings[run].measured for run in group.runs
-            ):
-                parts, shown = separate_repeats(_aligned_errors(dataset, group, output)), output
-        for part in parts:
-            rows = tuple(group.rows[i] for i in part)
-            sets.append(Repeats(tuple(group.runs[i] for i in part), rows))
-        if len(parts) > 1:
-            names = (
-                " and ".join(dataset.recordings[group.runs[i]].name for i in part) for part in parts
-            )
+    sets, findings = list(dataset.repeats), []
+    for output in dataset.outputs:
+        for group in list(sets):
+            if not all(output in dataset.recordings[run].measured for run in group.runs):
+                continue
+            parts = separated(group, _aligned_errors(dataset, group, output))
+            if len(parts) == 1:
+                continue
+            at = sets.index(group)
+            sets[at : at + 1] = parts
+            names = [" and ".join(dataset.recordings[r].name for r in part.runs) for part in parts]
             text = (
                 f"{'; '.join(names)} are sets of repeats that differ from each other as no noise "
                 "does: another zero, load or setting that is not recorded; load_mass states a load"
             )
-            findings.append(Finding(SEPARATED, "", shown, float(len(parts)), text))
+            findings.append(Finding(SEPARATED, "", output, float(len(parts)), text))
     return tuple(sets), findings
-
-
-def _excluded_alike(
-    recordings: Sequence[Recording], repeats: Sequence[Repeats]
-) -> tuple[Recording, ...]:
-    """Recordings of which repeats exclude the samples that any of them excludes.
-
-    Else their difference there is what the model leaves, and counts as noise.
-    """
-    out = list(recordings)
-    for group in repeats:
-        for output in OUTPUTS if len(group.runs) > 1 else ():
-            if not all(output in recordings[run].valid for run in group.runs):
-                continue
-            own = zip(group.runs, group.rows, strict=True)
-            common = np.all([recordings[run].valid[output][rows] for run, rows in own], axis=0)
-            for run, rows in zip(group.runs, group.rows, strict=True):
-                valid = out[run].valid[output].copy()
-                valid[rows[~common]] = False
-                out[run] = replace(out[run], valid={**out[run].valid, output: valid})
-    return tuple(out)
 
 
 def assemble(

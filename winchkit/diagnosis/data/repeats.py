@@ -17,7 +17,7 @@ of their total. Ann. Eugenics 11, 47-52.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -45,6 +45,8 @@ _RATE_TOLERANCE = 0.05
 """Relative difference of sampling intervals of repeats; screened."""
 _LEAST_REPEATS = 3
 """Repeats from which one can be outlying; theory: of two, neither is."""
+_LEAST_SEPARABLE = 4
+"""Repeats from which there can be two sets; theory: of fewer, one has a single run."""
 _LEAST_RATIO = 4.0
 """Mean square of the difference from the nearest repeat over that of the others, below which a run
 is only noisier; screened: twice the rms."""
@@ -219,13 +221,15 @@ def outlying_repeat(errors: Array) -> Outlying | None:
     return Outlying(index, float(np.sqrt(nearest[index])), float(np.sqrt(nearest[usual])))
 
 
-def separate_repeats(errors: Array) -> list[list[int]]:
-    """Partition of repeats into sets whose members predict each other, by their order.
+def separated(group: Repeats, errors: Array) -> list[Repeats]:
+    """Repeats in sets whose members predict each other.
 
     ``errors`` (m, n): as of :func:`outlying_repeat`. Returns: one set, unless the nearest runs of
     two sets differ by more than all runs from the nearest of their own set, by the same test, and
     by more than the profile leaves of one of the runs.
     """
+    if len(errors) < _LEAST_SEPARABLE:
+        return [group]
     squares, dofs = _differences(errors)
     nearest = np.argmin(squares, axis=1)
     own = int(np.argmax(squares[np.arange(len(errors)), nearest]))
@@ -236,8 +240,30 @@ def separate_repeats(errors: Array) -> list[list[int]]:
     least = min(_mean_square(error)[0] for error in errors)
     is_apart = number > 1 and apart[pair] > least
     if not is_apart or not _is_larger(apart[pair], within, (dofs[pair], dof), len(errors)):
-        return [list(range(len(errors)))]
-    return [np.flatnonzero(labels == label).tolist() for label in range(number)]
+        return [group]
+    parts = [np.flatnonzero(labels == label).tolist() for label in range(number)]
+    return [
+        Repeats(tuple(group.runs[i] for i in part), tuple(group.rows[i] for i in part))
+        for part in parts
+    ]
+
+
+def excluded_alike(
+    repeats: Sequence[Repeats], valid: Sequence[Mapping[str, NDArray[np.bool_]]]
+) -> list[Mapping[str, NDArray[np.bool_]]]:
+    """Masks by output of every run, in which repeats exclude what any of them excludes.
+
+    Else their difference there is what the model leaves, and counts as noise.
+    """
+    out = [dict(own) for own in valid]
+    for group in repeats:
+        members = list(zip(group.runs, group.rows, strict=True))
+        for output in set.intersection(*(set(valid[run]) for run in group.runs)):
+            common = np.all([valid[run][output][rows] for run, rows in members], axis=0)
+            for run, rows in members:
+                out[run][output] = out[run][output].copy()
+                out[run][output][rows[~common]] = False
+    return [*out]
 
 
 def _differences(errors: Array) -> tuple[Array, Array]:
