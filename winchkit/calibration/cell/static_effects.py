@@ -176,6 +176,8 @@ def _moved(load: Array, error: Array, after: Array) -> Array:
 
     The one that explains more: the zero may move before that reading settles.
     """
+    if not after.any():
+        return after
     line = np.column_stack([np.ones_like(load), load])
     largest = (np.abs(load) >= float(np.max(np.abs(load)))).astype(np.float64)
     both = [np.maximum.accumulate(own) for own in (after, np.maximum(after, largest))]
