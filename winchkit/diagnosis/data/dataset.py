@@ -31,7 +31,13 @@ from winchkit.diagnosis.data.repeats import (
     outlying_repeat,
     separated,
 )
-from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
+from winchkit.diagnosis.data.sampling import (
+    at_new_angles,
+    away_from,
+    bridged,
+    bridged_channel,
+    evenly_stamped,
+)
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count
 from winchkit.diagnosis.data.standstill import standstill_findings, standstill_mask
@@ -231,8 +237,9 @@ def _prepared(
     inspected = [inspect_run(run, has_cable=has_cable) for run in runs]
     sanity = findings(inspected, profile, catalogue)
     resolution = resolutions(inspected)
-    runs, mended = evenly_stamped([usable(one) for one in inspected])
-    notes += mended
+    runs, held = at_new_angles([usable(one) for one in inspected], sanity)
+    runs, mended = evenly_stamped(runs)
+    notes += [*held, *mended]
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:
         notes.append(decimation.words)
