@@ -68,7 +68,7 @@ def test_friction_of_a_speed_ladder_is_no_offset_of_its_runs(
 
 
 def test_what_the_friction_leaves_is_no_other_law_of_the_gravity() -> None:
-    """The angle that a run reaches follows its speed, and so does what the friction leaves."""
+    """The angle that a run reaches and what the friction leaves follow its speed."""
     found = found_in(ladder(2, 0.0, (1, -1), highest=4.0))
     gravity = next(s for s in found.steps if s.effects[0] == "joint-gravity")
     assert gravity.law == "established"
