@@ -24,11 +24,15 @@ SPEEDS = (0.02, 0.06, 0.2, 0.5, 1.0)
 
 
 def ladder(
-    repeats: int, offset: float, directions: tuple[int, ...] = (1,), highest: float = SPEEDS[-1]
+    repeats: int,
+    offset: float,
+    directions: tuple[int, ...] = (1,),
+    speeds: tuple[float, ...] = SPEEDS,
+    seed: int = 3,
 ) -> list[Run]:
-    random, runs = np.random.default_rng(3), []
+    random, runs = np.random.default_rng(seed), []
     for repeat in range(repeats):
-        for speed in (*SPEEDS[:-1], highest):
+        for speed in speeds:
             for sign in directions:
                 time = np.arange(0.0, 5.0, 0.02)
                 rate = sign * speed * (1 - np.exp(-time / 0.15))
@@ -67,9 +71,17 @@ def test_friction_of_a_speed_ladder_is_no_offset_of_its_runs(
     assert COULOMB - 0.5 < first.value < COULOMB + SATURATING + 0.5
 
 
+def test_a_step_stays_whose_loss_groups_of_another_speed_do_not_show() -> None:
+    """Each speed once: the fastest run alone determines the gravity, and left out nothing helps."""
+    speeds = tuple(np.deg2rad((1.0, 3.0, 10.0, 20.0, 40.0, 60.0)).tolist())
+    found = found_in(ladder(1, 0.0, speeds=speeds, seed=4))
+    assert "motor-coulomb" in {effect for step in found.steps for effect in step.effects}
+    assert found.outputs["motor_torque"].heldout_rms_after < 2 * NOISE
+
+
 def test_what_the_friction_leaves_is_no_other_law_of_the_gravity() -> None:
     """The angle that a run reaches and what the friction leaves follow its speed."""
-    found = found_in(ladder(2, 0.0, (1, -1), highest=4.0))
+    found = found_in(ladder(2, 0.0, (1, -1), (*SPEEDS[:-1], 4.0)))
     gravity = next(s for s in found.steps if s.effects[0] == "joint-gravity")
     assert gravity.law == "established"
     torque = found.outputs["motor_torque"]
