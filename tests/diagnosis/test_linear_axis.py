@@ -40,7 +40,7 @@ HEAD = 'schema = 1\nkind = "axis"\nname = "carriage"\n'
 LINEAR = HEAD + 'motion = "linear"\n[[effect]]\nid = "rotor-inertia"\nmass = "40 kg"\n'
 ROTARY = HEAD + '[[effect]]\nid = "rotor-inertia"\ninertia = "40 kg m^2"\n'
 OF_TURNS = re.compile(
-    r"\bN m\b|\bmotor[ _]torque\b|\bmotor[ _]angle\b|\bm?rad\b|(?<![-\w])torque\b(?!-)"
+    r"\bN m\b|\bmotor[ _](?:torque|angle|side)\b|\bm?rad\b|(?<![-\w])torque\b(?!-)"
 )
 
 

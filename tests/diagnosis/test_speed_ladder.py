@@ -23,10 +23,16 @@ SPEEDS = (0.02, 0.06, 0.2, 0.5, 1.0)
 """rad/s."""
 
 
-def ladder(repeats: int, offset: float, directions: tuple[int, ...] = (1,)) -> list[Run]:
-    random, runs = np.random.default_rng(3), []
+def ladder(
+    repeats: int,
+    offset: float,
+    directions: tuple[int, ...] = (1,),
+    speeds: tuple[float, ...] = SPEEDS,
+    seed: int = 3,
+) -> list[Run]:
+    random, runs = np.random.default_rng(seed), []
     for repeat in range(repeats):
-        for speed in SPEEDS:
+        for speed in speeds:
             for sign in directions:
                 time = np.arange(0.0, 5.0, 0.02)
                 rate = sign * speed * (1 - np.exp(-time / 0.15))
@@ -63,6 +69,24 @@ def test_friction_of_a_speed_ladder_is_no_offset_of_its_runs(
     friction = next(s for s in found.steps if "motor-coulomb" in s.effects)
     first = next(iter(friction.parameters[friction.effects[0]].values()))
     assert COULOMB - 0.5 < first.value < COULOMB + SATURATING + 0.5
+
+
+def test_a_step_stays_whose_loss_groups_of_another_speed_do_not_show() -> None:
+    """Each speed once: the fastest run alone determines the gravity, and left out nothing helps."""
+    speeds = tuple(np.deg2rad((1.0, 3.0, 10.0, 20.0, 40.0, 60.0)).tolist())
+    found = found_in(ladder(1, 0.0, speeds=speeds, seed=4))
+    assert "motor-coulomb" in {effect for step in found.steps for effect in step.effects}
+    assert found.outputs["motor_torque"].heldout_rms_after < 2 * NOISE
+
+
+def test_what_the_friction_leaves_is_no_other_law_of_the_gravity() -> None:
+    """The angle that a run reaches and what the friction leaves follow its speed."""
+    found = found_in(ladder(2, 0.0, (1, -1), (*SPEEDS[:-1], 4.0)))
+    gravity = next(s for s in found.steps if s.effects[0] == "joint-gravity")
+    assert gravity.law == "established"
+    torque = found.outputs["motor_torque"]
+    assert torque.noise_rms is not None
+    assert torque.heldout_rms_after > 2 * torque.noise_rms
 
 
 def test_offsets_between_repeats_are_reported_with_their_size() -> None:

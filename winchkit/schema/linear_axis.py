@@ -41,6 +41,8 @@ UNITS: Mapping[str, str] = {
 _WORDS: tuple[tuple[re.Pattern[str], str], ...] = tuple(
     (re.compile(pattern), word)
     for pattern, word in (
+        (r"\binertia on the motor side\b", "moved mass"),
+        (r"\bmotor side\b", "axis"),
         (r"\b(?:motor|drum)(?:_| )angle\b", "position"),
         (r"\bmotor(?:_| )velocity\b", "velocity"),
         (r"\bmotor(?:_| )torque\b", "force"),

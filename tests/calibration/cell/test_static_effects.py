@@ -120,11 +120,19 @@ def test_exact_points_need_no_noise() -> None:
     assert (effect.effect, effect.value) == ("cell-gain", pytest.approx(0.01))
 
 
-def moved(seed: int, kind: str, series: int = 3) -> list[CalibrationPoint]:
-    """Readings after the full load 0.4 N lower: in every series, or from then on."""
+def moved(
+    seed: int, kind: str, series: int = 3, *, at_full: bool = False
+) -> list[CalibrationPoint]:
+    """Readings after the full load 0.4 N lower: in every series, or from then on.
+
+    ``at_full``: that of the full load as well.
+    """
     shifted, is_after = [], False
-    for point in weighed(seed, series=series):
-        is_after = point.going == "down" or (is_after and kind == "zero-shift")
+    points = weighed(seed, series=series)
+    full = max(point.load for point in points)
+    for point in points:
+        is_there = point.going == "down" or (at_full and point.load == full)
+        is_after = is_there or (is_after and kind == "zero-shift")
         lower = point.indicated - 0.4 * is_after
         shifted.append(CalibrationPoint(point.load, lower, 0.0, point.going, point.series))
     return shifted
@@ -139,6 +147,16 @@ def test_a_moved_zero_is_named_by_its_order(kind: str) -> None:
     assert values[kind].value == pytest.approx(-0.4, abs=5 * values[kind].std)
     once = static_effects(moved(1, kind, series=1))
     assert "zero-return" in {e.effect for e in once.effects}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("at_full", [False, True])
+def test_a_zero_may_move_before_the_full_load_is_read(seed: int, at_full: bool) -> None:
+    values = {
+        e.effect: e for e in static_effects(moved(seed, "zero-shift", at_full=at_full)).effects
+    }
+    assert values["zero-shift"].value == pytest.approx(-0.4, abs=4 * values["zero-shift"].std)
+    assert "cell-nonlinearity" not in values
 
 
 @pytest.mark.parametrize("seed", range(4))

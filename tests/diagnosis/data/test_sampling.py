@@ -15,7 +15,8 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.sampling import away_from, even_instants
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.runs.run import Run
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
 
 FAST = Ride(samples=8000, rate=200.0, period=8.0, stroke=200.0)
 
@@ -136,3 +137,27 @@ def test_stamps_that_jitter_change_no_value(fine: list[Run]) -> None:
         replace(run, time=run.time + 0.0125 * random.uniform(-1, 1, len(run))) for run in even
     ]
     assert coulomb(stamped) == pytest.approx(coulomb(even), rel=1e-3)
+
+
+def test_an_angle_that_the_logger_holds_is_compared_at_its_new_values() -> None:
+    """An instrument of 67 Hz in a log of 1 kHz, with a rest: inertia and friction by formula."""
+    random, time = np.random.default_rng(1), np.arange(0.0, 30.0, 0.001)
+    moving = np.minimum(time, 20.0)
+    angle = 0.8 * np.sin(2.1 * moving) + 0.4 * np.sin(5.3 * moving + 1)
+    rate = np.gradient(angle, time)
+    torque = 0.5 * np.gradient(rate, time) + 6 * np.tanh(rate / 0.03) + 0.3 * rate
+    held = np.arange(len(time)) // 15 * 15
+    measured = {
+        "motor_angle": (angle + random.normal(0, 1e-4, len(time)), "rad"),
+        "motor_torque": (torque + random.normal(0, 0.3, len(time)), "N m"),
+    }
+    channels = {name: Channel(values[held], unit) for name, (values, unit) in measured.items()}
+    data = prepare([Run("held", time, channels, {})], AxisProfile(name="joint"))
+    (recording,) = data.recordings
+    assert np.diff(recording.signals.time) == pytest.approx(0.015)
+    assert recording.signals.time[-1] > 29.9
+    assert any("every 15th row" in note for note in data.notes)
+    away = (np.abs(rate[held][::15]) > 0.3) & (time[::15] < 19.9)
+    count = min(len(away), len(recording.raw.at.motor_rate))
+    found = recording.raw.at.motor_rate[:count][away[:count]]
+    assert found == pytest.approx(rate[held][::15][:count][away[:count]], abs=0.1)

@@ -126,6 +126,8 @@ def test_unit_of_a_header_cell(text: str, name: str, unit: str) -> None:
         ("velocidad", "motor_velocity"),
         ("tiempo", "time"),
         ("LoadCell", "tension"),
+        ("eff_j1", "motor_torque"),
+        ("eff_left_knee", "motor_torque"),
         ("Cell temperature", "temperature"),
         ("Position demand value", ""),
         ("Sollwinkel", "motor_angle"),
@@ -141,6 +143,24 @@ def test_names_in_several_languages(name: str, channel: str) -> None:
         return
     assert meaning is not None
     assert meaning.channel == channel
+
+
+@pytest.mark.parametrize("name", ["eff", "eff_mech", "efficiency 2", "motor_eff"])
+def test_an_efficiency_is_no_effort(name: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is None or meaning.channel != "motor_torque"
+
+
+@pytest.mark.parametrize(
+    ("name", "others"), [("x [in]", ()), ("z [mm]", ()), ("x [in]", ("y [in]",))]
+)
+def test_a_coordinate_without_others_is_the_position_of_a_linear_axis(
+    name: str, others: tuple[str, ...], tmp_path: Path
+) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, **dict.fromkeys((name, *others), m.angle), "force [N]": m.torque}
+    found = {item.channel for item in guess(tmp_path / "log.csv", columns).assignments}
+    assert ({"position", "force"} <= found) == (not others)
 
 
 def test_words_are_separated() -> None:

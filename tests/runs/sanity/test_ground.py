@@ -12,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.cli.files.check import command
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.ground import ground_mask
 from winchkit.runs.sanity.inspection import inspect_run
+from winchkit.schema.profiles.axis import AxisProfile
 
 MASS, RADIUS, GRAVITY = 20.0, 0.05, 9.80665
 WEIGHT = MASS * GRAVITY * RADIUS
@@ -77,6 +79,22 @@ def test_a_hanging_load_has_no_such_stretch(
     seed: int, friction: float, inertia: float, cell: bool
 ) -> None:
     assert not ground_mask(lifting(seed, friction=friction, inertia=inertia, cell=cell)).any()
+
+
+def test_an_eccentric_weight_stands_on_no_ground() -> None:
+    """A mass on an arm that swings to both sides, and on one that goes up to the horizontal."""
+    time = np.arange(0.0, 60.0, 0.02)
+    both, up = 1.5 * np.sin(time), 0.75 * (1 - np.cos(time))
+    for angle in (both, up):
+        torque = WEIGHT * np.sin(angle) + 0.1 * WEIGHT * np.sign(np.gradient(angle))
+        channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+        run = Run("swing", time, channels, metadata={"load_mass": f"{MASS} kg"})
+        found = {f.code for f in inspect_run(run, has_cable=False).findings}
+        assert "load-on-ground" not in found
+        data = prepare([run], AxisProfile(name="arm"))
+        assert "load-on-ground" not in {f.code for f in data.sanity}
+        if angle is both:
+            assert not ground_mask(run).any()
 
 
 def test_without_a_known_mass_nothing_is_left_out() -> None:

@@ -5,11 +5,11 @@ are significant (t test, 5 %) are fitted by least squares, and that of least BIC
 are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and ``cell-
 hysteresis``, so that the values go into a profile, and three that depend on the order of the loads:
 a zero return (all readings of a series after its largest load), a zero shift (all readings after
-the first largest load) and a loop that closes at both ends (4h x (1 − x) of the reading on the way
-down, x the share of the largest load: the parabolas of Rayleigh's law). Readings in a unit of their
-own (counts, mV/V) have their zero and span by definition; the other terms are then in newtons of
-their own span. Series that repeat each other give the pure error, with which the lack of fit of the
-kept model is tested.
+the first largest load, or from that reading on) and a loop that closes at both ends (4h x (1 − x)
+of the reading on the way down, x the share of the largest load: the parabolas of Rayleigh's law).
+Readings in a unit of their own (counts, mV/V) have their zero and span by definition; the other
+terms are then in newtons of their own span. Series that repeat each other give the pure error, with
+which the lack of fit of the kept model is tested.
 
 References
 ----------
@@ -117,9 +117,9 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
     error = reading - load
     up = np.array([1.0 if point.going == "up" else -1.0 for point in points])
     after = np.array([point.going == "down" for point in points], dtype=np.float64)
-    moved = np.maximum.accumulate(after)
     bow, loop = (load / _UNIT_TENSION) ** 2, -up * load
     share = load / max(float(np.max(np.abs(load))), 1e-300)
+    moved = _moved(load, error, after)
     closed = 4 * after * share * (1 - np.abs(share))
     columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved, closed])
     offered = [k for k in range(len(_TERMS)) if k not in (*_RETURNING, _SHIFT) or len(set(up)) > 1]
@@ -169,6 +169,19 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
         p_value,
         others if square > floor else (),
     )
+
+
+def _moved(load: Array, error: Array, after: Array) -> Array:
+    """Where the zero has moved: after the first largest load, or from its reading on.
+
+    The one that explains more: the zero may move before that reading settles.
+    """
+    if not after.any():
+        return after
+    line = np.column_stack([np.ones_like(load), load])
+    largest = (np.abs(load) >= float(np.max(np.abs(load)))).astype(np.float64)
+    both = [np.maximum.accumulate(own) for own in (after, np.maximum(after, largest))]
+    return min(both, key=lambda own: _fit(np.column_stack([line, own]), error)[2])
 
 
 def _names_of(terms: Iterable[int]) -> tuple[str, ...]:

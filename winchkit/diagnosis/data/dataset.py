@@ -24,8 +24,20 @@ from winchkit.diagnosis.data.low_pass import (
     removed_by_low_pass,
 )
 from winchkit.diagnosis.data.motor_current import with_torques
-from winchkit.diagnosis.data.repeats import Repeats, find_repeats, outlying_repeat
-from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
+from winchkit.diagnosis.data.repeats import (
+    Repeats,
+    excluded_alike,
+    find_repeats,
+    outlying_repeat,
+    separated,
+)
+from winchkit.diagnosis.data.sampling import (
+    at_new_angles,
+    away_from,
+    bridged,
+    bridged_channel,
+    evenly_stamped,
+)
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count
 from winchkit.diagnosis.data.standstill import standstill_findings, standstill_mask
@@ -66,6 +78,7 @@ class Filtering:
 
 NO_REPEATS = "no-repeats"
 OUTLYING = "outlying-repeat"
+SEPARATED = "separate-repeats"
 ROUNDED_ALIKE = "noise-floor-implausible"
 _EQUAL_TEMPERATURE = 0.5
 """Difference of mean temperatures above which repeats may differ by a thermal effect, K."""
@@ -220,11 +233,13 @@ def _prepared(
     runs, coarse = without_constants(runs)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
-    inspected = [inspect_run(run) for run in runs]
+    has_cable = not isinstance(profile, AxisProfile)
+    inspected = [inspect_run(run, has_cable=has_cable) for run in runs]
     sanity = findings(inspected, profile, catalogue)
     resolution = resolutions(inspected)
-    runs, mended = evenly_stamped([usable(one) for one in inspected])
-    notes += mended
+    runs, held = at_new_angles([usable(one) for one in inspected], sanity)
+    runs, mended = evenly_stamped(runs)
+    notes += [*held, *mended]
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:
         notes.append(decimation.words)
@@ -239,6 +254,14 @@ def _prepared(
         left_out.append(outlying[1])
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
+    repeats, apart = _separated(dataset)
+    alike = excluded_alike(repeats, [r.valid for r in dataset.recordings])
+    recordings = tuple(map(_with_valid, dataset.recordings, alike))
+    dataset = replace(dataset, repeats=repeats, recordings=recordings)
+    left_out += apart
+    if nowhere := [r for r in recordings if not any(map(np.any, r.valid.values()))]:
+        what = "has no sample that can be compared: `winchkit check` shows what is left out"
+        raise RunError([Fault(what, r.path or r.name) for r in nowhere])
     anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
     at_speeds = is_setting([motion.motor_rate for motion in dataset.motions])
     zeroed = [
@@ -377,6 +400,31 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
     return None
 
 
+def _with_valid(recording: Recording, valid: Mapping[str, Mask]) -> Recording:
+    return replace(recording, valid=valid)
+
+
+def _separated(dataset: Dataset) -> tuple[tuple[Repeats, ...], list[Finding]]:
+    """The repeats in sets that were made under one value of what is not recorded."""
+    sets, findings = list(dataset.repeats), []
+    for output in dataset.outputs:
+        for group in list(sets):
+            if not all(output in dataset.recordings[run].measured for run in group.runs):
+                continue
+            parts = separated(group, _aligned_errors(dataset, group, output))
+            if len(parts) == 1:
+                continue
+            at = sets.index(group)
+            sets[at : at + 1] = parts
+            names = [" and ".join(dataset.recordings[r].name for r in part.runs) for part in parts]
+            text = (
+                f"{'; '.join(names)} are sets of repeats that differ from each other as no noise "
+                "does: another zero, load or setting that is not recorded; load_mass states a load"
+            )
+            findings.append(Finding(SEPARATED, "", output, float(len(parts)), text))
+    return tuple(sets), findings
+
+
 def assemble(
     runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
@@ -394,7 +442,7 @@ def assemble(
         raw = [decimation.motion(motion) for motion in raw]
         runs = [decimation.run(run) for run in runs]
         signals = [_signals(run, profile) for run in runs]
-    repeats = find_repeats(signals)
+    repeats = find_repeats(signals, [run.load_mass for run in runs])
     smooth = denoised_motions(line, signals, raw, repeats)
     nominal = [line.predict(motion) for motion in raw]
     stands = [

@@ -6,7 +6,8 @@ their mean loads agree to 2 %. Clocks are aligned by the lag of least mean-squar
 Repeats have the same recorded inputs, so that every model predicts the same outputs for them. A run
 that its nearest repeat predicts no better than the profile does, while the others predict each
 other, was made under another value of something that is not recorded, such as the zero of the
-angle. Taken for noise, this difference would hide all effects.
+angle. Taken for noise, this difference would hide all effects. Several such runs that predict each
+other are repeats of each other, such as those under another weight that is not stated.
 
 References
 ----------
@@ -16,11 +17,14 @@ of their total. Ann. Eugenics 11, 47-52.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, irfft, next_fast_len, rfft
+from scipy.sparse.csgraph import connected_components
 from scipy.special import fdtrc
 
 from winchkit.arrays import Array
@@ -41,6 +45,8 @@ _RATE_TOLERANCE = 0.05
 """Relative difference of sampling intervals of repeats; screened."""
 _LEAST_REPEATS = 3
 """Repeats from which one can be outlying; theory: of two, neither is."""
+_LEAST_SEPARABLE = 4
+"""Repeats from which there can be two sets; theory: of fewer, one has a single run."""
 _LEAST_RATIO = 4.0
 """Mean square of the difference from the nearest repeat over that of the others, below which a run
 is only noisier; screened: twice the rms."""
@@ -57,15 +63,20 @@ class Repeats:
     """Per run the indices of the samples that correspond, all of one length."""
 
 
-def find_repeats(signals: list[Signals]) -> list[Repeats]:
+def find_repeats(
+    signals: list[Signals], stated: Sequence[float | None] | None = None
+) -> list[Repeats]:
     """Partition all runs into sets of repeats.
 
-    ``signals``: measured inputs, one per run.
+    ``signals``: measured inputs, one per run. ``stated``: mass that each run states, kg, also where
+    the model has no cable that carries it.
     """
+    masses = stated or [run.load_mass for run in signals]
     sets: list[tuple[list[int], list[float]]] = []
     for index, run in enumerate(signals):
         for members, shifts in sets:
-            shift = _shift(signals[members[0]], run)
+            is_same = masses[members[0]] == masses[index]
+            shift = _shift(signals[members[0]], run) if is_same else None
             if shift is not None and _share_time(
                 [*(signals[m] for m in members), run], [*shifts, shift]
             ):
@@ -197,22 +208,79 @@ def outlying_repeat(errors: Array) -> Outlying | None:
     count = len(errors)
     if count < _LEAST_REPEATS:
         return None
-    own = np.array([_mean_square(error)[0] for error in errors])
-    nearest, dof = np.full(count, np.inf), np.ones(count)
-    for i in range(count):
-        for j in range(count):
-            square, own_dof = _mean_square(errors[i] - errors[j]) if i != j else (np.inf, 1.0)
-            if square < nearest[i]:
-                nearest[i], dof[i] = square, own_dof
+    squares, dofs = _differences(errors)
+    pairs = np.arange(count), np.argmin(squares, axis=1)
+    nearest, dof = squares[pairs], dofs[pairs]
     index = int(np.argmax(nearest))
     others = np.delete(np.arange(count), index)
     usual = others[np.argsort(nearest[others])[len(others) // 2]]
-    if nearest[index] < own[index] or nearest[index] <= _LEAST_RATIO * nearest[usual]:
+    if nearest[index] < _mean_square(errors[index])[0]:
         return None
-    ratio = nearest[index] / max(nearest[usual], np.finfo(float).tiny)
-    if count * float(fdtrc(dof[index], dof[usual], ratio)) > _LEVEL:
+    if not _is_larger(nearest[index], nearest[usual], (dof[index], dof[usual]), count):
         return None
     return Outlying(index, float(np.sqrt(nearest[index])), float(np.sqrt(nearest[usual])))
+
+
+def separated(group: Repeats, errors: Array) -> list[Repeats]:
+    """Repeats in sets whose members predict each other.
+
+    ``errors`` (m, n): as of :func:`outlying_repeat`. Returns: one set, unless the nearest runs of
+    two sets differ by more than all runs from the nearest of their own set, by the same test, and
+    by more than the profile leaves of one of the runs.
+    """
+    if len(errors) < _LEAST_SEPARABLE:
+        return [group]
+    squares, dofs = _differences(errors)
+    nearest = np.argmin(squares, axis=1)
+    own = int(np.argmax(squares[np.arange(len(errors)), nearest]))
+    within, dof = squares[own, nearest[own]], dofs[own, nearest[own]]
+    number, labels = connected_components(squares <= _LEAST_RATIO * within, directed=False)
+    apart = np.where(labels[:, None] != labels, squares, np.inf)
+    pair = np.unravel_index(np.argmin(apart), apart.shape)
+    least = min(_mean_square(error)[0] for error in errors)
+    is_apart = number > 1 and apart[pair] > least
+    if not is_apart or not _is_larger(apart[pair], within, (dofs[pair], dof), len(errors)):
+        return [group]
+    parts = [np.flatnonzero(labels == label).tolist() for label in range(number)]
+    return [
+        Repeats(tuple(group.runs[i] for i in part), tuple(group.rows[i] for i in part))
+        for part in parts
+    ]
+
+
+def excluded_alike(
+    repeats: Sequence[Repeats], valid: Sequence[Mapping[str, NDArray[np.bool_]]]
+) -> list[Mapping[str, NDArray[np.bool_]]]:
+    """Masks by output of every run, in which repeats exclude what any of them excludes.
+
+    Else their difference there is what the model leaves, and counts as noise.
+    """
+    out = [dict(own) for own in valid]
+    for group in repeats:
+        members = list(zip(group.runs, group.rows, strict=True))
+        for output in set.intersection(*(set(valid[run]) for run in group.runs)):
+            common = np.all([valid[run][output][rows] for run, rows in members], axis=0)
+            for run, rows in members:
+                out[run][output] = out[run][output].copy()
+                out[run][output][rows[~common]] = False
+    return [*out]
+
+
+def _differences(errors: Array) -> tuple[Array, Array]:
+    """Mean squares of the differences of all pairs, (m, m), and their degrees of freedom."""
+    count = len(errors)
+    squares, dofs = np.full((count, count), np.inf), np.ones((count, count))
+    for i, j in combinations(range(count), 2):
+        squares[i, j], dofs[i, j] = _mean_square(errors[i] - errors[j])
+    lower = np.tril_indices(count, -1)
+    squares[lower], dofs[lower] = squares.T[lower], dofs.T[lower]
+    return squares, dofs
+
+
+def _is_larger(square: float, usual: float, dofs: tuple[float, float], count: int) -> bool:
+    """Whether a mean square is at least four times another one, and significantly larger."""
+    ratio = square / max(usual, np.finfo(float).tiny)
+    return ratio > _LEAST_RATIO and count * float(fdtrc(*dofs, ratio)) <= _LEVEL
 
 
 def _mean_square(values: Array) -> tuple[float, float]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,16 @@ from winchkit.arrays import Array
 from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.repeated_values import REPEATED
 
 Mask = NDArray[np.bool_]
 
 _GAP = 2.5
 """Shortest gap in median sampling intervals (rule of thumb: one missing sample and jitter)."""
 
+_HELD = 3
+"""Rows from which an angle is held: every second row may be one of two clocks in step."""
 _SAME = 1e-3
 """Deviation of stamps from even instants, in steps, that is none (as in the even clock)."""
 _LEAST_STAMPS = 16
@@ -103,6 +108,34 @@ def _nearest_even(time: Array) -> Array | None:
         return None
     step, start = np.polyfit(number, time, 1)
     return np.asarray(start + step * number)
+
+
+def at_new_angles(runs: Sequence[Run], findings: Iterable[Finding]) -> tuple[list[Run], list[str]]:
+    """Runs whose motor angle was held over most rows, at the rows of its new values, and notes.
+
+    Differences of a held angle are zero but for steps. At rest the rows go on at the usual number
+    of rows that a value is held.
+    """
+    held = {f.run for f in findings if (f.code, f.channel) == (REPEATED, "motor_angle")}
+    out, notes = [], []
+    for run in runs:
+        angle = run["motor_angle"]
+        new = np.flatnonzero(np.concatenate([[True], np.diff(bridged(angle)) != 0]))
+        usual = round(float(np.median(np.diff(new)))) if len(new) > 1 else 1
+        if run.name not in held or usual < _HELD:
+            out.append(run)
+            continue
+        ends = [*new.tolist(), len(run)]
+        rows = [
+            row for a, b in pairwise(ends) for row in range(a, max(a + 1, b - usual // 2), usual)
+        ]
+        channels = {n: replace(c, values=c.values[rows]) for n, c in run.channels.items()}
+        out.append(replace(run, time=run.time[rows], channels=channels))
+        notes.append(
+            f"{run.name}: the motor angle is new in every {usual}th row only; of {len(run)} rows "
+            f"the {len(rows)} at its new values are compared"
+        )
+    return out, notes
 
 
 def away_from(unknown: Mask, reach: int) -> Mask:

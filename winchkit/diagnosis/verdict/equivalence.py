@@ -209,15 +209,16 @@ def _beside_another(
 ) -> _Member | None:
     """A rival with the further effect that explains most of what it leaves; None without one.
 
-    The further effect is no member of the set and contains none: that would explain the same
-    without the rival.
+    The further effect is no member of the set, contains none and reduces to none: that would
+    explain the same without the rival.
     """
     own = rival.hypothesis.terms[-1]
     for item in engine.scores(rival, noise):
         effect = item.candidate.effect
         if item.net_gain <= 0.0:
             return None
-        if {effect.id, *effect.contains} & {member.id for member in (own.effect, *members)}:
+        containing = {effect.id, *effect.contains, *effect.reduces_to}
+        if containing & {member.id for member in (own.effect, *members)}:
             continue
         trial = engine.trial(rival, item, noise)
         labels = [term.effect.id for term in trial.fit.hypothesis.terms]

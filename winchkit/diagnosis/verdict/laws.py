@@ -27,6 +27,9 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
+_DOUBLED = 2.0
+"""Ratio of errors by which a step is missed: it had three quarters of the mean square."""
+
 
 def simplified(
     engine: SelectionEngine,
@@ -95,6 +98,16 @@ def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise)
     return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
 
 
+def _is_missed(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> bool:
+    """Whether a smaller model doubles an error in blocks of time, whatever other groups show.
+
+    A group of another speed may be predicted by values so far outside of theirs that no step helps.
+    """
+    blocks = engine.regression.blocks
+    now, errors = (held_out_rms(engine.regression, m, noise, blocks) for m in (present, smaller))
+    return any(errors[output] > _DOUBLED * now[output] for output in now)
+
+
 def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
@@ -134,7 +147,8 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: BandNoise) -
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         without = engine.refit(present.hypothesis.without(index), noise)
         rise = _rise(engine, without, present, noise)
-        if rise <= 1 / RELEVANT_RATIO and (best is None or rise < best[0]):
+        is_needless = rise <= 1 / RELEVANT_RATIO and not _is_missed(engine, without, present, noise)
+        if is_needless and (best is None or rise < best[0]):
             best = rise, without
     return None if best is None else best[1]
 

@@ -5,7 +5,8 @@ Curves over one variable (polynomials, linear splines, kinks, powers) speak agai
 - in place of the step one that explains more by a tenth; a curve over the law's own variable
   contains the law and explains about as much;
 - beside the step one over the law's own variable that explains a tenth of what the model leaves
-  well above the noise: what is left belongs to the law, and its values contain a part of it.
+  well above the noise, and more of it than a curve over any other variable: what is left belongs to
+  the law, and its values contain a part of it.
 
 The same curves show whether anything in a residual is predictable at all.
 
@@ -73,7 +74,11 @@ def variables_of_law(term: Term) -> frozenset[str]:
 def _beside(
     engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
 ) -> OpenLaw | None:
-    """A curve over the law's own variable that explains a tenth of what is left far above noise."""
+    """A curve over the law's own variable that explains a tenth of what is left far above noise.
+
+    Where another variable explains more, what is left is not the law's: at one speed a file the
+    angle follows the speed.
+    """
     term = final.hypothesis.terms[index]
     outputs, over = sorted(term.effect.outputs), variables_of_law(term)
     regression, folds = engine.regression, engine.folds(final, noise)
@@ -83,12 +88,12 @@ def _beside(
         return None
     partial = PartialRegression(final.residual, final.jacobian, noise.inverse_sigma(regression))
     price = engine.penalty_per_parameter
-    found = ranked_curves(regression, partial, outputs, price, at_places(over))[:1]
     left = excess(present, size)
-    for curve in found:
+    for curve in ranked_curves(regression, partial, outputs, price)[:1]:
+        if curve.variable not in over or curve.net_gain <= 0.0:
+            return None
         errors = _errors(regression, _with_curve(regression, final, curve), noise, folds, size)
-        share = 1 - excess(errors, size) / left
-        if curve.net_gain > 0.0 and share > MARGIN:
+        if (share := 1 - excess(errors, size) / left) > MARGIN:
             return OpenLaw(
                 curve,
                 f"a curve over {curve.words} beside it explains {percent(share)} of what is left: "

@@ -55,6 +55,9 @@ _BY_DIMENSION = {
 }
 _LINEAR = {**CHANNELS, "cable_length": "position", "tension": "force", "load": "force"}
 """Channel of a linear axis for what a name or a unit stands for."""
+_COORDINATES = {f"platform_{axis}" for axis in "xyz"}
+_IN_SPACE = {*POSE_DIMENSIONS, *MATRIX}
+_ALONG = NamedChannel("cable_length", 2, "the only coordinate")
 _TURNING = {"angle", "angular speed", "torque", COUNTS, COUNT_RATE, SHARE}
 """Dimensions of a motor that turns."""
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
@@ -83,7 +86,7 @@ def choose(
     ``without``: channels that the file does not have, as the user says.
     """
     choice = Choice()
-    linear = is_linear(table, given, motion)
+    linear, lone = is_linear(table, given, motion), _lone_coordinate(table)
     numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
     free: list[ChannelCandidate] = []
@@ -95,7 +98,8 @@ def choose(
                 ChannelCandidate(column, channel, 0, unit, "given")
             )
         else:
-            found = _candidate(column, numbered, linear=linear)
+            along = _ALONG if linear and column is lone else None
+            found = _candidate(column, numbered, along, linear=linear)
             if len(column) < min(FEWEST, longest / FEWEST):
                 few = f"{len(column)} values, of a parameter: others have {longest}"
                 found = ChannelCandidate(column, "", reason=few)
@@ -164,15 +168,19 @@ def _left_after(
 
 
 def is_linear(table: ColumnTable, given: Mapping[str, str], motion: str = "") -> bool:
-    """Whether a file is of a linear axis: a position in m and a force in N, nothing that turns."""
+    """Whether a file is of a linear axis: a position in m and a force in N, nothing that turns.
+
+    A coordinate without others (``x``) is a position.
+    """
     bases = {channel.rpartition(".")[2] for channel in given.values()}
     if motion or bases & ROTARY.keys():
         return motion != "rotary"
     if bases & (CHANNELS.keys() | _LINEAR.keys() | POSE_DIMENSIONS.keys()):
         return False
-    found = set()
+    found, lone = set(), _lone_coordinate(table)
     for column in table.columns:
         meaning, unit = meaning_of(column.name, column.labels), read_unit(column.unit)
+        meaning = _ALONG if column is lone else meaning
         if meaning is None or not meaning.channel or column.texts is not None:
             continue
         base, dimension = meaning.channel.rpartition(".")[2], unit.dimension if unit else ""
@@ -184,12 +192,26 @@ def is_linear(table: ColumnTable, given: Mapping[str, str], motion: str = "") ->
     return found >= {"position", "force"}
 
 
+def _lone_coordinate(table: ColumnTable) -> FileColumn | None:
+    """The column of a coordinate, where the file has one only, and no angle of a pose."""
+    meanings = [(item, meaning_of(item.name, item.labels)) for item in table.columns]
+    found = [(item, one.channel) for item, one in meanings if one and one.channel in _IN_SPACE]
+    return found[0][0] if len(found) == 1 and found[0][1] in _COORDINATES else None
+
+
 def _candidate(
-    column: FileColumn, numbered: Mapping[str, str], *, linear: bool = False
+    column: FileColumn,
+    numbered: Mapping[str, str],
+    along: NamedChannel | None = None,
+    *,
+    linear: bool = False,
 ) -> ChannelCandidate:
-    """Channel of one column by its name, its unit, or its values."""
+    """Channel of one column by its name, its unit, or its values.
+
+    ``along``: meaning of a coordinate that is the position of a linear axis.
+    """
     unit = read_unit(column.unit)
-    meaning = meaning_of(column.name, column.labels)
+    meaning = along or meaning_of(column.name, column.labels)
     if column.texts is not None:
         return _of_text(column)
     if not np.any(np.isfinite(column.values)):

@@ -157,6 +157,12 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         "motor_torque",
     ),
+    # An effort of a joint; an efficiency is of no joint and has no number.
+    (
+        r"^eff (.*\d$|joint\b|(left|right|knee|hip|ankle|elbow|wrist|shoulder)\b)",
+        2,
+        "motor_torque",
+    ),
     (
         r"\b(currents?(?! (encoder|pos|angle|length|reading|tension|force|load))|"
         r"strom\w*|\w+strom|istrom|courant|corriente|corrente|iq|i q|"

@@ -2,6 +2,7 @@
 
 Rows that were lost, a homing during the recording, and turns that an encoder lost change the angle
 by a step of another size than all others. Both sides of it are right, and their difference is not.
+Where the sampling interval changes, the samples of the longer one are no gaps of the shorter one.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
+from winchkit.quantity_text import quantity
 from winchkit.runs.importing.streams import Stream, Streams
 from winchkit.schema.linear_axis import rotary_name
 
@@ -31,6 +34,12 @@ _FASTER = 2.0
 """Rate over a gap, in the largest rate elsewhere, from which it is no motion."""
 _AMBIGUOUS = 0.5
 """Share of the modulus that a counter passes in a gap over which its turns are not known."""
+_EVEN = 0.1
+"""Deviation from the usual interval, in that interval, of a sample that is taken in time."""
+_STEADY = 100
+"""Samples before and after a change of the interval; fewer may be chance among lost ones."""
+_MOSTLY = 0.97
+"""Share of them that are in time there."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +79,10 @@ def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterat
     if len(known) < _FEWEST or np.any(np.diff(time) <= 0):
         return
     intervals, steps = np.diff(time), np.diff(angle)
+    for index in _changes_of_interval(intervals):
+        before, after = (quantity(float(np.median(part)), "s") for part in _sides(intervals, index))
+        what = f"the sampling interval changes from {before} to {after} after {time[index]:.6g} s"
+        yield Jump("time", float(time[index]), float(time[index + 1]), what)
     usual = float(np.median(intervals))
     rates = steps / np.maximum(intervals, usual)
     winch, dot, base = name.rpartition(".")
@@ -102,6 +115,35 @@ def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterat
             "homed or the encoder lost turns"
         )
         yield Jump(name, float(time[index]), float(time[index + 1]), what)
+
+
+def _sides(intervals: Array, index: int) -> tuple[Array, Array]:
+    """The intervals before one, and as many as are needed after it."""
+    return intervals[max(0, index - _STEADY) : index], intervals[index + 1 : index + 1 + _STEADY]
+
+
+def _changes_of_interval(intervals: Array, first: int = 0) -> list[int]:
+    """Intervals at which a recording with an even clock goes on with another one.
+
+    ``first``: index of the first of them, counted from the start of the recording.
+    """
+    if len(intervals) < 2 * _STEADY:
+        return []
+    late = ~_in_time(intervals, intervals)
+    lately = np.convolve(late, np.ones(_STEADY), "valid") >= _MOSTLY * _STEADY
+    start = int(np.argmax(lately))
+    index = start + int(np.argmax(late[start:]))
+    after = intervals[index + 1 : index + 1 + _STEADY]
+    is_change = lately.any() and index >= _STEADY and len(after) == _STEADY
+    if not is_change or max(np.mean(late[:index]), np.mean(~_in_time(after, after))) > 1 - _MOSTLY:
+        return []
+    return [first + index, *_changes_of_interval(intervals[index + 1 :], first + index + 1)]
+
+
+def _in_time(intervals: Array, usual: Array) -> NDArray[np.bool_]:
+    """Whether intervals are the usual one at the start of others."""
+    one = float(np.median(usual[:_STEADY]))
+    return np.asarray(np.abs(intervals - one) <= _EVEN * one)
 
 
 def _outstanding(rates: Array, steps: Array) -> list[int]:

@@ -4,7 +4,8 @@ The samples of a run are sorted by the motor angle into groups of equal count. T
 is the mean of its medians winding in and paying out, so that friction cancels. A hanging mass gives
 nearly the same force everywhere; where it stands on the ground, where the cable is slack or a brake
 holds it, the force at one end is below half of that, by more than its scatter. No drum, friction or
-inertia does this: at the lower end a motion turns by an acceleration upwards, which raises it.
+inertia does this: at the lower end a motion turns by an acceleration upwards, which raises it. A
+force of the other sign there is that of an eccentric weight.
 """
 
 from __future__ import annotations
@@ -88,6 +89,8 @@ def _edge(position: Array, force: Array) -> float | None:
     scatter = float(np.median(np.abs(np.diff(usual[first:]))))
     step = float(np.median(usual[first:]) - np.median(usual[: max(first, 1)]))
     if first == 0 or first > _MOST * count or low[first:].any() or step < _SCATTER * scatter:
+        return None
+    if np.min(usual[:first]) < -_LOW * level:
         return None
     while first < count - _AHEAD and usual[first] < _FULL * np.median(
         usual[first + 1 : first + 1 + _AHEAD]

@@ -40,8 +40,11 @@ class Inspection:
     """Samples in which the cable does not carry the load, (n,)."""
 
 
-def inspect_run(run: Run) -> Inspection:
-    """Inspect a run, without a model of the winch."""
+def inspect_run(run: Run, *, has_cable: bool = True) -> Inspection:
+    """Inspect a run, without a model of the winch.
+
+    ``has_cable``: whether a stated mass may hang on a cable; the weight of a joint does not.
+    """
     steps = resolutions(run)
     masks = outlier_masks(run, steps)
     out = list(sampling(run))
@@ -59,7 +62,7 @@ def inspect_run(run: Run) -> Inspection:
     for winch in run.winches():
         out += velocity_consistency(run, winch)
         own = run.of_winch(winch)
-        held = ground_mask(own)
+        held = ground_mask(own) if has_cable else held
         out += load_on_ground(own, held)
     return Inspection(run, tuple(out), steps, masks, held)
 

@@ -14,6 +14,8 @@ from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding, share
 
+REPEATED = "repeated-values"
+"""Code of the finding."""
 _LEAST_SHARE = 0.2
 """Share of repeated values that is reported; fewer hardly change a spectrum. Rule of thumb."""
 _LEAST_CHANGES = 20
@@ -49,7 +51,7 @@ def repeated_values(run: Run, name: str, step: float) -> Iterator[Finding]:
         return
     rate = 1 / (run.interval * float(np.mean(moving)))
     yield Finding(
-        "repeated-values",
+        REPEATED,
         run.name,
         name,
         repeated,

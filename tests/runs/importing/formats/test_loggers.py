@@ -227,3 +227,22 @@ def test_quoted_commas_that_may_separate_thousands_are_refused(
             imported(path)
     else:
         assert imported(path)["motor_angle"] == pytest.approx(ANGLE, abs=6e-4)
+
+
+def test_pairs_of_x_and_y_are_the_times_and_values_of_the_channel_above(tmp_path: Path) -> None:
+    """Scopes of amplifiers: object numbers in brackets are no units."""
+    lines = ["Position [0x6064],,Actual torque [mNm],", "X,Y,X,Y"]
+    rows = zip(TIME, ANGLE, TORQUE, strict=True)
+    lines += [f"  {1e3 * t:.1f},{q:.6f},  {1e3 * t:.1f},{1e3 * m:.4f}" for t, q, m in rows]
+    path = tmp_path / "scope.csv"
+    path.write_text("\n".join(lines) + "\n")
+    table = read_table(path)
+    assert [column.source for column in table.columns] == [
+        "Position [0x6064] time",
+        "Position [0x6064]",
+        "Actual torque [mNm] time",
+        "Actual torque",
+    ]
+    columns = [f"time={table.columns[k].source} [ms]" for k in (0, 2)]
+    (found,) = import_runs(path, columns=[*columns, "motor_angle=Position [0x6064] [rad]"])
+    right(found)

@@ -14,6 +14,7 @@ IEEE Trans. ASSP 24, 1976.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -143,6 +144,29 @@ def correlated(one: TimedSignal, two: TimedSignal) -> Agreement | None:
         float(counts[top]) * step,
     )
     return agreement_at(peak, one, two, b, step)
+
+
+def lag_of_several(many: Sequence[Array], time: Array, two: TimedSignal) -> float | None:
+    """Lag at which a signal is best a sum of others, s to be added to its times.
+
+    ``many``: signals, (n,) each, at the times ``time``. The squared multiple correlation is rᵀG⁻¹r
+    of the correlations r with each and of those among them, G.
+    """
+    signals = [TimedSignal("", time, values) for values in many]
+    interval = max(interval_of(signals[0]), interval_of(two))
+    step = max(interval / 2, (np.ptp(time) + np.ptp(two.time)) / _MOST)
+    b = _even(two, step, interval)
+    parts = [_even(one, step, interval) for one in signals]
+    shorter = min(len(parts[0]), len(b))
+    if shorter < 16:
+        return None
+    found = [_normalised(part, b, max(16, int(LEAST_OVERLAP * shorter))) for part in parts]
+    r = np.array([one[1] for one in found])
+    if not r.size:
+        return None
+    squares = np.sum(r * (np.linalg.pinv(np.corrcoef(parts)) @ r), axis=0)
+    top = int(np.argmax(squares))
+    return float(time[0] - two.time[0]) + (float(found[0][0][top]) + vertex_of(squares, top)) * step
 
 
 def agreement_at(

@@ -15,6 +15,7 @@ from winchkit.runs.importing.clocks.cross_correlation import (
     correlated,
     signals_by_base,
 )
+from winchkit.runs.importing.clocks.friction import TORQUE, correlated_without_friction
 from winchkit.runs.importing.clocks.multilateration import pose_agreement
 from winchkit.runs.importing.clocks.point_names import by_names
 from winchkit.runs.importing.streams import Stream, Streams
@@ -222,7 +223,7 @@ def agreement_of(first: Streams, second: Streams) -> Agreement | None:
     for one, two in _signals(first, second):
         if has_pose and "platform_" in f"{one.channel} {two.channel}":
             continue
-        found = correlated(one, two)
+        found = _correlated(one, two, first, second)
         if found is None:
             continue
         better = best is None or (found.is_known, abs(found.correlation)) > (
@@ -232,6 +233,22 @@ def agreement_of(first: Streams, second: Streams) -> Agreement | None:
         if better:
             best = found
     return best
+
+
+def _correlated(
+    one: TimedSignal, two: TimedSignal, first: Streams, second: Streams
+) -> Agreement | None:
+    """Largest correlation of two signals; of a torque with a force without its friction."""
+    bases = [signal.channel.rpartition(".")[2] for signal in (one, two)]
+    if bases.count(TORQUE) == 1:
+        is_first = bases[0] == TORQUE
+        torque, force = (one, two) if is_first else (two, one)
+        name = f"{torque.channel.removesuffix(TORQUE)}motor_angle"
+        angles = signals_by_base(first if is_first else second).get("motor_angle", ())
+        for angle in angles:
+            if angle.channel == name:
+                return correlated_without_friction(torque, force, angle, is_first=is_first)
+    return correlated(one, two)
 
 
 def span_of(streams: Streams) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """Names and units of columns from the rows above the numbers, and the metadata above these rows.
 
 Known shapes: one row ``name [unit]``; a row of names and one of units; several rows of labels above
-the names (trackers: body, quantity, axis); pairs of key and value per column (TwinCAT Scope).
+the names (trackers: body, quantity, axis); pairs of key and value per column (TwinCAT Scope);
+``X, Y`` below the title of each channel (amplifiers).
 """
 
 from __future__ import annotations
@@ -82,7 +83,12 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     ]
     if is_blank:
         block = [_with_brackets(cells, width) for cells in block]
-    header = _keyed(block, width) or _titled(block, width) or _stacked(block, width)
+    header = (
+        _keyed(block, width)
+        or _titled(block, width)
+        or _paired(block, width)
+        or _stacked(block, width)
+    )
     header.metadata.update(_metadata([[" ".join(c)] if is_blank else c for c in above]))
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
@@ -169,7 +175,7 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
             (is_spread, True),
             (len(given) == 1 < width, False),
             (2 * len(given) < width or is_number, False),
-            (end > cut and len(given) == 2 and width > 3, False),
+            (end > cut and len(given) == 2 and width > 3 and bool(cells[1]), False),
         )
         if not next((belongs for holds, belongs in cases if holds), True):
             break
@@ -268,6 +274,25 @@ def _titled(block: list[list[str]], width: int) -> Header | None:
         [()] * width,
         {cells[0]: cells[1] for cells in others if len(cells) == 2},
     )
+
+
+def _paired(block: list[list[str]], width: int) -> Header | None:
+    """``X, Y, X, Y`` below the title of each pair: the times of a channel and its values."""
+    rows = [_padded(cells, width) for cells in block]
+    pairs = width // 2
+    if len(rows) < 2 or pairs < 2 or [cell.casefold() for cell in rows[-1]] != ["x", "y"] * pairs:
+        return None
+    titles = [rows[-2][2 * k] or rows[-2][2 * k + 1] for k in range(pairs)]
+    if not all(titles):
+        return None
+    found = Header([], [], [])
+    for title in titles:
+        name, unit = split_unit(title)
+        is_unit = read_unit(unit) is not None
+        found.names += ["time", name if is_unit else title]
+        found.units += ["", unit if is_unit else ""]
+        found.labels += [(title,), ()]
+    return found
 
 
 def _stacked(block: list[list[str]], width: int) -> Header:

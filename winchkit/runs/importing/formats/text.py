@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import islice, pairwise
 from typing import overload
 
 import numpy as np
@@ -30,6 +30,7 @@ from winchkit.runs.importing.formats.header import (
     keyed_width,
     read_header,
 )
+from winchkit.runs.importing.formats.segments import joined, start_of, starts_of_segments
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
 
@@ -54,6 +55,25 @@ def read_text_table(path: str, data: bytes) -> ColumnTable:
     """Read a text file; raises RunError for a binary file, and for one without rows of numbers."""
     lines, encoding = decode(data, path)
     lines, numbers = whole_lines(lines)
+    is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
+    if not (cuts := starts_of_segments(lines)):
+        return _table_of_lines(path, lines, numbers, encoding, is_ended=is_ended)
+    numbers = numbers or list(range(1, len(lines) + 1))
+    tables, starts = [], []
+    for start, end in pairwise([*cuts, len(lines)]):
+        own = [*lines[: cuts[0]], *lines[start:end]]
+        lines_of = [*numbers[: cuts[0]], *numbers[start:end]]
+        last = is_ended or end < len(lines)
+        tables.append(_table_of_lines(path, own, lines_of, encoding, is_ended=last))
+        header = lines[start : start + _end_of_header(lines[start:end])]
+        decimal = "," if "decimal comma" in tables[-1].layout else "."
+        starts.append(start_of(header, decimal))
+    return joined(tables, starts, [numbers[cut] for cut in cuts])
+
+
+def _table_of_lines(
+    path: str, lines: list[str], numbers: list[int] | None, encoding: str, *, is_ended: bool
+) -> ColumnTable:
     dialect = find_dialect(lines[_end_of_header(lines) :])
     if dialect is None:
         shown = next((line for line in lines if line.strip()), "")[:60]
@@ -67,7 +87,6 @@ def read_text_table(path: str, data: bytes) -> ColumnTable:
     width = len(split_line(lines[names], dialect.delimiter)) if end and names < len(lines) else 0
     dialect = replace(dialect, width=max(width, dialect.width))
     rows = _SplitLines(lines, dialect.delimiter, numbers, (names, width))
-    is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
     return replace(table_of_rows(path, rows, dialect, is_ended=is_ended), layout=layout)
 
