@@ -47,7 +47,7 @@ def test_no_change_has_no_table_and_names_stay_text() -> None:
     assert hostile.count("script") == plain.count("script")
 
 
-def test_a_winch_stands_beside_the_mean_of_the_others() -> None:
+def test_a_winch_is_compared_with_the_mean_of_the_others() -> None:
     (parameter,) = history(0.02, 0.0).parameters
     winch = next(one for one in parameter.winches if one.winch == "C")
     line, _ = odd_texts(parameter, winch)
