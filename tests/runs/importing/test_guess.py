@@ -277,9 +277,10 @@ def test_short_names_of_a_current_and_a_set_point(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "channel"),
     [("theta_dot", "motor_velocity"), ("q_dot", "motor_velocity"), ("phi dot", "motor_velocity"),
-     ("theta_ddot", ""), ("q_ddot", ""), ("theta", "motor_angle"), ("Mot_pos", "motor_angle")],
+     ("theta_ddot", ""), ("q_ddot", ""), ("theta", "motor_angle"), ("Mot_pos", "motor_angle"),
+     ("tau_model", ""), ("torque_predicted", ""), ("tau_meas", "motor_torque")],
 )  # fmt: skip
-def test_derivatives_by_their_dots(name: str, channel: str) -> None:
+def test_derivatives_by_their_dots_and_predictions(name: str, channel: str) -> None:
     meaning = meaning_of(name)
     assert meaning is not None
     assert (meaning.channel, meaning.rank) == (channel, 1)

@@ -64,7 +64,7 @@ _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 """Ranks of candidates after those by a whole name: a component or part of a name, the unit alone,
 the order of the columns."""
 _UNKNOWN = "unknown name"
-_NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
+_NOT_USED = "set point, prediction, error, state, counter, constant or a quantity of another body"
 _SCALAR = {"tension", "load", "motor_torque", "force"}
 """Channels of a cable or a shaft, which have no components along x, y and z."""
 _UNEVEN = 0.5

@@ -45,11 +45,11 @@ _JOINT = (
 )
 """Angles of a joint, which a cable or a gearbox may separate from the motor."""
 _NOT_USED = (
-    # Set points and errors.
+    # Set points, predictions and errors.
     r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
     r"set (?=pos|vel|tor|cur|ang|spe)|"
     r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
-    r"reference|ref|consigne|consigna|goal|planned|feed ?forward|"
+    r"model|predicted|prediction|rnea|inverse dynamics|reference|ref|consigne|consigna|goal|planned|feed ?forward|"
     r"vorgabe|fuhrungs\w*|profile|offset|"
     r"limit\w*)\b",
     r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
