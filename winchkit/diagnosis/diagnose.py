@@ -25,7 +25,7 @@ from winchkit.diagnosis.residuals.attribution import (
     harmonics,
 )
 from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
-from winchkit.diagnosis.results import Diagnosis, NextRun, OutputFit, Step
+from winchkit.diagnosis.results import CandidateScore, Diagnosis, NextRun, OutputFit, Step
 from winchkit.diagnosis.search import (
     ProgressCallback,
     no_progress,
@@ -281,14 +281,32 @@ def _unless_at_noise(engine: TimeSeriesSelection, result: SelectionResult) -> Se
 def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:
     """Errors of the profile and scores of the candidates, without a verdict."""
     start = _by_file(engine, start)
-    before, dataset = (start.initial_model, start.initial_noise), engine.regression.dataset
+    scores = candidates_of(engine, start)
+    return _without_steps(engine, start, float("nan"), candidates=scores, interrupted=True)
+
+
+def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
+    """Verdict ``unknown`` for runs with a wrong sign or unit: no effect must explain that."""
+    return _without_steps(engine, _by_file(engine, initial_result(engine)), 1.0)
+
+
+def _without_steps(
+    engine: TimeSeriesSelection,
+    result: SelectionResult,
+    unexplained_share: float,
+    *,
+    candidates: tuple[CandidateScore, ...] = (),
+    interrupted: bool = False,
+) -> WinchAnswer:
+    """Errors of the profile alone."""
+    dataset, model = engine.regression.dataset, (result.initial_model, result.initial_noise)
     diagnosis = Diagnosis(
         verdict="unknown",
-        outputs=output_fits(engine, before, before),
+        outputs=output_fits(engine, model, model),
         steps=(),
-        candidates=candidates_of(engine, start),
+        candidates=candidates,
         detectable=(),
-        unexplained_share=float("nan"),
+        unexplained_share=unexplained_share,
         where=(),
         next_runs=(),
         notes=dataset.notes,
@@ -296,39 +314,16 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         used_share=dataset.used_share,
         removed=dataset.removed,
         caveats=dataset.caveats,
-        interrupted=True,
-        traces=_traces(engine, start, named=False),
+        interrupted=interrupted,
+        traces=_traces(engine, result, named=False),
     )
-    return WinchAnswer(engine, start, in_units_of(dataset.profile, diagnosis))
+    return WinchAnswer(engine, result, in_units_of(dataset.profile, diagnosis))
 
 
 def _by_file(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
     """A result with the errors of the file's values: refitted ones would imitate a wrong factor."""
     own = file_model(engine, engine.initial_model, result.initial_noise)
     return replace(result, initial_model=own)
-
-
-def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
-    """Verdict ``unknown`` for runs with a wrong sign or unit: no effect must explain that."""
-    result = _by_file(engine, initial_result(engine))
-    dataset, model = engine.regression.dataset, (result.initial_model, result.initial_noise)
-    diagnosis = Diagnosis(
-        verdict="unknown",
-        outputs=output_fits(engine, model, model),
-        steps=(),
-        candidates=(),
-        detectable=(),
-        unexplained_share=1.0,
-        where=(),
-        next_runs=(),
-        notes=dataset.notes,
-        sanity=dataset.sanity,
-        used_share=dataset.used_share,
-        removed=dataset.removed,
-        caveats=dataset.caveats,
-        traces=_traces(engine, result, named=False),
-    )
-    return WinchAnswer(engine, result, in_units_of(dataset.profile, diagnosis))
 
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis) -> WinchAnswer:
