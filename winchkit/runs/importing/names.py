@@ -49,7 +49,8 @@ _NOT_USED = (
     r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
     r"set (?=pos|vel|tor|cur|ang|spe)|"
     r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
-    r"model|predicted|prediction|rnea|inverse dynamics|reference|ref|consigne|consigna|goal|planned|feed ?forward|"
+    r"model|predicted|prediction|rnea|inverse dynamics|"
+    r"reference|ref|consigne|consigna|goal|planned|feed ?forward|"
     r"vorgabe|fuhrungs\w*|profile|offset|"
     r"limit\w*)\b",
     r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
