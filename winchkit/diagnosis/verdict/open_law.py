@@ -75,7 +75,6 @@ def _beside(
     engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
 ) -> OpenLaw | None:
     """A curve over the law's own variable that explains a tenth of what is left far above noise.
-
     Where another variable explains more, what is left is not the law's: at one speed a file the
     angle follows the speed.
     """
@@ -112,9 +111,8 @@ def _better(
 ) -> OpenLaw | None:
     """A curve that explains more than the term at ``index``, in its place.
 
-    None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
-    parameter) and held out. Where the law leaves its outputs above the noise of repeats and a curve
-    does not, the law is open as well.
+    It explains more by a tenth, in sample (beyond a penalty of ln n for every parameter) and held
+    out, or reaches the noise of repeats where the law does not.
     """
     outputs: list[str] = sorted(final.hypothesis.terms[index].effect.outputs)
     regression, folds = engine.regression, engine.folds(final, noise)
@@ -183,9 +181,9 @@ def _screened(
     outputs: Sequence[str],
     margin: float,
 ) -> list[FittedCurve]:
-    """Curves whose gain exceeds that of a term by the margin in sample, the largest first.
-
-    On the coarse regression first, where there is one: it has all frequencies of a slow curve.
+    """Curves whose gain exceeds that of a term by the margin in sample, the largest first. The
+    coarse regression, which has all frequencies of a slow curve, is screened before all samples
+    are.
     """
     coarse = engine.coarse
     if coarse is not None:
