@@ -57,11 +57,9 @@ def verdict_of(
     refuted: Collection[str],
     predictable: Callable[[], bool],
 ) -> Verdict:
-    """Verdict by the table of the errors; the noise is known from repeats or instruments, else it
-    is a lower bound.
-
-    Outputs are ``deciding`` that vary by more than their noise; the rest is ``predictable`` where a
-    free curve or an order predicts a tenth of it.
+    """Verdict by the table of the errors; noise that is not known from repeats or instruments is a
+    lower bound. The ``deciding`` outputs vary by more than their noise; what remains is
+    ``predictable`` where a free curve or an order predicts a tenth of it.
     """
     counted = {name: output for name, output in outputs.items() if name in deciding}
     at_noise = bool(counted) and all(map(is_at_noise, counted.values()))

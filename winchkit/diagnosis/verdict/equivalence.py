@@ -3,9 +3,7 @@
 Each rival is refitted in the place of the named effect, under the larger of the noise and of what
 the named model leaves unexplained (quasi-likelihood). It joins the set unless it is worse in
 sample, Δχ² being above the square of a quantile of t (9 for well-known variances), and held out,
-the difference over blocks of time being significant by random signs at 5 %. A law that reduces to
-another member leaves the set again where a likelihood-ratio test does not prefer it. Waves over
-the motor angle join where they differ by the load alone and the runs have one.
+the difference over blocks of time being significant by random signs at 5 %.
 
 References
 ----------
@@ -232,7 +230,7 @@ def _is_listed(own: Effect, rival: Effect) -> bool:
 
 
 def _adds_nothing(rich: _Member, simple: _Member) -> bool:
-    """Whether a law with more parameters is not preferred by a likelihood-ratio test at 5 %."""
+    """Whether a likelihood-ratio test (Wilks) at 5 % does not prefer a law with more parameters."""
     counts = [
         Coordinates(m.term.effect).n_parameters + sum(map(len, m.compared.hypothesis.starts))
         for m in (rich, simple)
