@@ -115,18 +115,8 @@ class FittedAddition:
 
 @dataclass(frozen=True)
 class FittedWinchAddition(FittedAddition):
-    """An addition to a winch's profile.
-
-    Attributes
-    ----------
-    initial_model : Fit
-        The profile's effects, refitted.
-    final : Fit
-        The same with the new effect.
-    engine : TimeSeriesSelection
-        By which both were fitted.
-    noise : BandNoise
-        Of the final fit.
+    """An addition to a winch's profile with its engine and fits; the noise is that of the final
+    one.
     """
 
     regression: TimeSeriesRegression
@@ -138,10 +128,8 @@ class FittedWinchAddition(FittedAddition):
     def refitted_to_motion(
         self, runs: Sequence[Run], progress: Callable[[int], None]
     ) -> FittedWinchAddition:
-        """The same effects at the values that make the measured motion.
-
-        The errors of the outputs are those of the prediction with these values. Raises as
-        :func:`~winchkit.dynamics.refit.refit_to_motion`.
+        """The same effects at the values that make the measured motion, with the errors of these
+        values. Raises as :func:`~winchkit.dynamics.refit.refit_to_motion`.
         """
         old = self.addition.terms
         profile = self.regression.dataset.profile
@@ -240,10 +228,7 @@ def fitted_addition(
     refit: str | None = None,
     progress: Callable[[int], None] = lambda step: None,
 ) -> FittedAddition:
-    """The same as :func:`add`, with the fits.
-
-    ``progress``: called with the number of each step of a refit.
-    """
+    """The same as :func:`add`, with the fits; ``progress`` gets the number of each refit step."""
     require_type(effect_id, str, "effect_id")
     require_types(runs, Run, "runs")
     if refit not in (None, "motion"):
@@ -337,8 +322,8 @@ def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedW
 def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:
     """Selection engine with the candidates that the fit of one effect needs.
 
-    Without repeats the noise is that beside all candidates, and an order is added where no other
-    candidate explains more; else only the signatures of thermal effects enter the noise.
+    Without repeats all are needed, since the noise is that beside them, and for an order, which is
+    added only where no other explains more. Otherwise only thermal signatures enter the noise.
     """
     whole = not dataset.repeated or has_orders(effect)
     known = catalogue.of_winches()

@@ -180,8 +180,8 @@ def _offsets_between_runs(
 ) -> dict[str, float]:
     """Standard deviation of an offset between runs without repeats, SI, of outputs that have one.
 
-    It is reported beside the errors and not taken out: that a model is wrong in every run by
-    another constant is the same.
+    It is reported and not taken out: a model with another constant error in every run looks the
+    same.
     """
     if regression.dataset.repeated:
         return {}

@@ -264,9 +264,8 @@ def diagnose_prepared(
 
 
 def _unless_at_noise(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
-    """The result, without additions where the profile leaves no error above the noise of repeats.
-
-    An effect may seem to be there in the frequencies at which repeats agree by chance.
+    """The result, without additions where the profile leaves no error above the noise of repeats:
+    effects appear in the frequencies at which repeats agree by chance.
     """
     if not result.noise.from_repeats:
         return result
@@ -327,9 +326,8 @@ def _by_file(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionR
 
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis) -> WinchAnswer:
-    """Steps of the final model with their doubts, the verdict, and the next programmes.
-
-    ``file`` are the effects of the profile at their file values.
+    """Steps of the final model with their doubts, the verdict, and the next programmes; ``file``
+    has the profile's effects at their file values.
     """
     regression, dataset = engine.regression, engine.regression.dataset
     best = reweighted(engine, result.final, result.noise)
@@ -451,9 +449,8 @@ def _rounded_law(
     outputs: Mapping[str, OutputFit],
     standing: Standing,
 ) -> str:
-    """Simpler law, a friction's with a rounded reversal, that explains all but a tenth, or none.
-
-    How a reversal looks is a nuisance: a drive's filter rounds it as well.
+    """Simpler law that explains all but a tenth, a friction's with a rounded reversal, or none. How
+    a reversal looks is a nuisance: a drive's filter rounds it as well.
     """
     effect = result.final.hypothesis.terms[index].effect
     if not effect.reduces_to:

@@ -24,9 +24,8 @@ _AS_GIVEN = {"run", "runs", "path", "programme", "profile", "effect", "effects",
 
 
 def in_units_of(profile: WinchProfile, result: T) -> T:
-    """A result with the names and units of a profile: those of a linear axis where it is one.
-
-    In the texts of another axis the drum, which it has none, is its output.
+    """A result with the names and units of a profile: those of a linear axis where it is one; in
+    texts on another axis "output" replaces "drum".
     """
     if isinstance(profile, AxisProfile) and isinstance(result, str) and not profile.is_linear:
         return cast(T, re.sub(r"\bdrum(?=\s+(?:angle|turn)\b)", "output", result))

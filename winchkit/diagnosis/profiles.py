@@ -15,9 +15,8 @@ Profile = WinchProfile | RobotProfile
 
 
 def of_wing(call: str, profile: Profile, band: float | None) -> Callable[..., Any] | None:
-    """A wing's function for its kind of profile; None for a winch.
-
-    Raises UsageError for a band, which only the torque of a winch's motor has.
+    """A wing's function for its kind of profile; None for a winch. Raises UsageError for a band,
+    which only the torque of a winch's motor has.
     """
     found = wings.call(call, profile)
     if found is not None and band is not None:

@@ -226,10 +226,7 @@ class Step:
 
 
 def series_orders(values: Mapping[str, Estimate]) -> list[tuple[int, Estimate]]:
-    """Whole orders of an effect with their amplitudes, largest first.
-
-    Returns: empty for an effect without an order or an amplitude.
-    """
+    """Whole orders of an effect with their amplitudes, largest first; empty without an order."""
     suffixes = [name.removeprefix(_ORDER) for name in values if name.startswith(_ORDER)]
     found = [
         (round(values[_ORDER + suffix].value), values[_AMPLITUDE + suffix])

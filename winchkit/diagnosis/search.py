@@ -63,9 +63,8 @@ def no_progress(what: str, share: float) -> None:
 def selection_engine(
     dataset: Dataset, catalogue: Catalogue, candidates: Iterable[Effect] | None = None
 ) -> TimeSeriesSelection:
-    """Selection engine whose initial model is the profile's own effects.
-
-    Candidates are all effects of winches, or those that are given.
+    """Selection engine whose initial model is the profile's own effects; by default all effects of
+    winches are candidates.
     """
     regression = TimeSeriesRegression(dataset)
     known = catalogue.mapped(lambda effect: with_inputs(effect, dataset))
@@ -81,9 +80,8 @@ def search(
     progress: ProgressCallback,
     known: Callable[[SelectionResult], None],
 ) -> tuple[TimeSeriesSelection, SelectionResult]:
-    """Engine and result of the last selection, with its simplest laws.
-
-    ``known`` gets the result of the profile alone, before the search.
+    """Engine and result of the last selection, with its simplest laws; ``known`` gets the result of
+    the profile alone before the search.
     """
     result, rounded = _with_transitions(engine, catalogue, _Trials(progress, "fitting"), known)
     engine, catalogue = rounded or (engine, catalogue)
@@ -116,8 +114,8 @@ def _with_transitions(
     """Result of the search, and engine and catalogue where reversals of friction are rounded.
 
     As soon as a friction that was found fits better with a transition, the search begins again with
-    it in every law of friction; its result is left where it has more effects and predicts no
-    better. It ends where ``is_enough``.
+    it in every law of friction; its result is dropped where it has more effects and predicts no
+    better. The search ends where ``is_enough``.
     """
     transitions: dict[str, float] = {}
 
@@ -165,8 +163,8 @@ def _with_delays_last(
     """The result, or that in which delays were the last candidates.
 
     A delay that the others imitate may take a part of cogging and friction, whose sizes are then
-    wrong. Where no more effects without any delay leave at most a tenth more of what the given
-    result explains, they are the model, and delays are added to it where they are accepted.
+    wrong. A model of no more effects without delays is preferred where it leaves at most a tenth
+    more of what the result explains; delays are added to it where they are accepted.
     """
 
     def has_more(fitted: Fit) -> bool:
@@ -200,9 +198,8 @@ def _has_more(fitted: Fit, other: Fit) -> bool:
 def _takes_place(
     engine: TimeSeriesSelection, result: SelectionResult, other: SelectionResult, without: Fit
 ) -> bool:
-    """Whether another result has no more effects than a result and explains nine tenths as much.
-
-    ``without``: the model from which on it is counted what they explain.
+    """Whether another result has no more effects and explains nine tenths of what the result
+    explains beside ``without``.
     """
     if _has_more(other.final, result.final):
         return False
@@ -222,9 +219,8 @@ def _with_plain_laws(
 ) -> tuple[TimeSeriesSelection, SelectionResult]:
     """The result with its simplest laws, found again without degenerate ones where none is needed.
 
-    A law with a degenerate shape may imitate another effect: presliding over a whole turn is a
-    spring. A model of no more effects without such laws takes its place where it explains nine
-    tenths of what they explain.
+    A degenerate law may imitate another effect: presliding over a whole turn is a spring. A model
+    of no more effects without such laws is preferred where it explains nine tenths as much.
     """
     plain = _simplified(engine, result)
     degenerate = degenerate_laws(engine, plain.final, plain.noise)
@@ -263,9 +259,8 @@ def with_offsets_where_better(
     again: Callable[[Dataset], Found],
     final: Callable[[Found], tuple[TimeSeriesSelection, Fit, BandNoise]],
 ) -> tuple[Dataset, Found]:
-    """Result with an offset per run, where one is found that predicts held-out blocks better.
-
-    Returns: data set and result, the given ones where offsets are not needed.
+    """Data set and result with an offset per run, where such a result predicts held-out blocks
+    better; else the given ones.
     """
     engine, fitted, noise = final(found)
     offset = with_run_offsets(dataset, engine.regression, fitted)

@@ -52,9 +52,8 @@ def steps_of(
     dataset: Dataset | None = None,
     spread: Spread | None = None,
 ) -> tuple[Step, ...]:
-    """Every addition with its equivalence set, values and held-out gain.
-
-    ``dataset``: runs of the winch, for combinations that have a name; None for a robot.
+    """Every addition with its equivalence set, values and held-out gain; the ``dataset`` of a winch
+    is for combinations that have a name.
     """
     final, noise, regression = result.final, result.noise, engine.regression
     out = []
@@ -106,9 +105,8 @@ class Standing:
 
 
 def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
-    """Whether another step of the same outputs explains more than ten times as much.
-
-    A law is known to a tenth of what it explains: the rest of a larger one may be this step.
+    """Whether another step of the same outputs explains more than ten times as much: its law is
+    known to a tenth, and what it leaves may be this step.
     """
     return any(standing.explained < CERTAIN * other.explained for other in others)
 
@@ -121,10 +119,9 @@ def standing_of(
     trusted: bool,
     spread: Mapping[str, float] | None = None,
 ) -> Standing:
-    """Standing of a step by the held-out errors of the model without it.
-
-    ``trusted``: whether its outputs decide on the model. ``spread``: two standard deviations of the
-    square of an error in units of the noise, by output, which is known from repeats.
+    """Standing of a step by the held-out errors of the model without it; it is ``trusted`` where
+    its outputs decide on the model. ``spread`` (from repeats) is two standard deviations of the
+    square of an error in units of the noise.
     """
     noise = {name: output.noise_rms for name, output in outputs.items()}
     after = {name: output.heldout_rms_after for name, output in outputs.items()}
@@ -157,10 +154,7 @@ def with_standing(
     curve: OpenLaw | None = None,
     small: bool = False,
 ) -> Step:
-    """A step with its share, law and doubts.
-
-    ``small``: whether another step of the same outputs explains ten times as much.
-    """
+    """A step with its share, law and doubts; ``small`` is that of :func:`is_small`."""
     doubts = list(_doubts(engine, result, step, index, curve))
     if standing.remaining:
         doubts.append(Doubt("remaining", standing.remaining))
@@ -281,9 +275,8 @@ def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Can
 
 
 def place_text(step: Step) -> str:
-    """``motor: motor_torque over speed``, by which a step that is not certain is followed.
-
-    The id of its first effect where it has no place.
+    """Place by which a step that is not certain is followed, as ``motor: motor_torque over speed``;
+    the id of its first effect without one.
     """
     if not step.place:
         return step.effects[0]

@@ -45,18 +45,14 @@ class Signature:
 
 
 def usual_values(effect: Effect) -> dict[str, float]:
-    """Values of typical size: amplitudes at their typical value, shapes at their default.
-
-    Returns: SI, by parameter.
-    """
+    """Values of typical size, SI: amplitudes at their typical value, shapes at their default."""
     sizes = {p.name: p.typical for p in effect.parameters if p.role == "amplitude"}
     return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
 
 
 def signature(effect: Effect, values: Values | None = None) -> Signature:
-    """Signature of an effect on the standard motion, or of a robot's effect on the standard poses.
-
-    ``values``: parameter values, SI; by default those of typical size.
+    """Signature of an effect on the standard motion, or of a robot's effect on the standard poses,
+    by default with values of typical size.
     """
     values = usual_values(effect) if values is None else values
     if effect.of_robots:
@@ -76,11 +72,8 @@ def signature(effect: Effect, values: Values | None = None) -> Signature:
 
 
 def sparkline(values: Array, width: int = _WIDTH) -> str:
-    """Values as ``width`` bars from their lowest to their highest; a gap where all are NaN.
-
-    Each bar is the value of its interval farthest from the median, so that spikes are visible.
-
-    ``values`` (n,): any unit; NaN where missing. Returns: Unicode block characters.
+    """Values in any unit as Unicode bars from their lowest to their highest; a gap where all are
+    NaN. Each bar is the value of its interval farthest from the median, so that spikes are visible.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):

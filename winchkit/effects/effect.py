@@ -96,9 +96,8 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Dynamics:
-    """Memory in continuous time, for simulation: the state is the parameter ``start`` at any time.
-
-    A state at a bound of ``start`` remains there while its rate leads outwards.
+    """Memory in continuous time, for simulation: the state is the parameter ``start`` at any time,
+    and remains at a bound of it while its rate leads outwards.
     """
 
     value: Callable[[Any, At, Values], Any]
@@ -283,9 +282,8 @@ class Effect:
 
 
 def told_apart(first: Effect, second: Effect) -> str:
-    """Run that distinguishes two effects, from the card that names the other one.
-
-    Returns: empty where no card has one.
+    """Run that distinguishes two effects, from the card that names the other one; empty without
+    one.
     """
     if second.id not in first.confused_with and first.id in second.confused_with:
         return second.told_apart

@@ -129,9 +129,8 @@ _ID = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
-    """Check the name and the file of a user effect before its computation.
-
-    Raises UsageError for an invalid or existing id, FileError for a file that exists.
+    """Check the name and the file of a user effect before its computation. Raises UsageError for an
+    invalid or existing id, FileError for a file that exists.
     """
     if path.suffix != ".py":
         raise UsageError(f"'{path}' is not a Python file; name it {path.stem or 'mine'}.py")
@@ -147,9 +146,8 @@ def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
 
 
 def write_own(term: Term, effect_id: str, path: Path) -> None:
-    """Write an empirical term as a file of a user effect.
-
-    Raises FileError where the file exists or cannot be written.
+    """Write an empirical term as a file of a user effect. Raises FileError where the file exists or
+    cannot be written.
     """
     effect = term.effect
     facts: dict[str, object] = {
@@ -168,9 +166,8 @@ def write_own(term: Term, effect_id: str, path: Path) -> None:
 
 
 def write_wave_on_drum(order: int, effect_id: str, path: Path) -> None:
-    """Write a sine of the wound length as a file of a user effect; raises as above.
-
-    ``order``: periods per drum turn.
+    """Write a sine of the wound length, with ``order`` periods per drum turn, as a user effect;
+    raises as :func:`write_own`.
     """
     _write(DRUM.format(id=effect_id, order=order, file=path.name), path)
 

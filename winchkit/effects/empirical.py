@@ -39,11 +39,8 @@ _NEEDS: Mapping[str, tuple[Need, ...]] = {
 
 
 def empirical_id(output: str, variable: str) -> str:
-    """Id of the curve of an output over a variable.
-
-    ``output``: ``cable_length``, ``tension`` or ``motor_torque``; also the names on a linear axis.
-    Returns:
-    ``empirical-OUTPUT-VARIABLE`` with hyphens.
+    """Id ``empirical-OUTPUT-VARIABLE`` (with hyphens) of the curve of an output over a variable;
+    the names may be those of a linear axis.
     """
     return shown_id(rotary_name(output), rotary_name(variable))
 
@@ -69,9 +66,8 @@ def heights(values: Values) -> list[float]:
 
 
 def placed(effect: Effect, low: float, high: float) -> Effect:
-    """A spline over the range of the data; an effect over an angle is unchanged.
-
-    ``low``, ``high``: range of its variable, SI.
+    """A spline over the range of the data, ``low`` to ``high``; an effect over an angle is
+    unchanged.
     """
     ends = {"low": (low,), "high": (high,)}
     parameters = tuple(replace(p, grid=ends.get(p.name, p.grid)) for p in effect.parameters)

@@ -19,10 +19,7 @@ _ROTARY = {linear: rotary for rotary, linear in PARAMETERS.items()}
 
 
 def catalogue_of(profile: WinchProfile, catalogue: Catalogue) -> Catalogue:
-    """Effects with the units of a profile: those of a linear axis where it is one.
-
-    ``catalogue``: effects; those of a linear axis stay. Returns: empirical effects included.
-    """
+    """Effects, empirical ones included, with the units of a profile: a linear axis has N and m."""
     return catalogue.mapped(linear_effect) if profile.is_linear else catalogue
 
 

@@ -29,10 +29,9 @@ def window(variable: Array, values: Values) -> Array:
 def located(effect: Effect, motions: Sequence[At]) -> Effect:
     """An effect with the grids of its places in the range of the data.
 
-    Returns: grids in the units of their parameters: ``low + share (high − low)`` for a place
-    (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``), whose lower
-    bound is a tenth of the least: the data do not show a smaller one. A delay is bounded by what a
-    filter and a bus can be, and at least by two samples.
+    A place (``Parameter.over``) is at ``low + share (high − low)``, an extent (``Parameter.along``)
+    at ``share (high − low)``; its lower bound is a tenth of the least, below which the data show
+    none. A delay is bounded by what a filter and a bus can be, and at least by two samples.
     """
     if effect.is_delay:
         step = max((float(np.median(np.diff(at.time))) for at in motions), default=0.0)

@@ -105,9 +105,8 @@ class Coordinates:
         return np.array(low), np.array(high)
 
     def deviations(self, vector: Array, std: Array, base: Mapping[str, float]) -> dict[str, float]:
-        """Standard deviations of values from those of coordinates, by the delta method.
-
-        The larger of both one-sided differences is taken: at a bound only one side is allowed.
+        """Standard deviations of values from those of coordinates, by the delta method with the
+        larger of both one-sided differences: at a bound only one side is allowed.
         """
         here, out = self.values(vector, base), {p.name: 0.0 for p in self._fitted}
         for index, step in enumerate(std):

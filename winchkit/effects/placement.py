@@ -26,10 +26,7 @@ class LineEffect(Effect):
 
 
 def at_line(effect: Effect, line: str) -> LineEffect:
-    """An effect placed on one line.
-
-    Returns: effect with the id ``EFFECT/LINE``.
-    """
+    """An effect placed on one line, with the id ``EFFECT/LINE``."""
     own = {f.name: getattr(effect, f.name) for f in fields(Effect)}
     own["id"] = f"{effect.id}/{line}"
     own["contains"] = tuple(f"{name}/{line}" for name in effect.contains)
@@ -37,12 +34,8 @@ def at_line(effect: Effect, line: str) -> LineEffect:
 
 
 def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
-    """A law of the cable with a home length for each given line on which it acts.
-
-    The cables are strained at home too, by unknown tensions. The law gives the strain relative to
-    home, and the home lengths absorb the difference.
-
-    Returns: effect with a further parameter per line, m.
+    """A law of the cable with a home length, m, for each given line on which it acts: the law gives
+    the strain relative to home, where the cables are strained too, by unknown tensions.
     """
     place = line_of_effect(effect)
     on = [line for line in lines if place in ("", line)]
@@ -66,10 +59,7 @@ def line_of_effect(effect: Effect) -> str:
 
 
 def placements(effect: Effect, lines: Sequence[str], *, moving: bool = False) -> Iterator[Effect]:
-    """Every placement of an effect on a robot.
-
-    ``moving``: else it is at rest at its poses.
-    """
+    """Every placement of an effect on a robot, ``moving`` or at rest at its poses."""
     places = effect.places(moving=moving)
     if places & {"all", "platform"}:
         yield effect

@@ -19,10 +19,7 @@ _ORDER = "order"
 
 
 def harmonic_series(terms: Sequence[Term]) -> Term:
-    """Terms of one effect with an order as one term.
-
-    ``terms``: of the same effect, single orders or series, the main order first.
-    """
+    """Terms of one effect, single orders or series with the main order first, as one series."""
     singles = [single for term in terms for single, _ in single_orders(term)]
     if len(singles) == 1:
         return singles[0]
@@ -51,10 +48,7 @@ def harmonic_series(terms: Sequence[Term]) -> Term:
 def single_orders(
     term: Term, std: Mapping[str, float] | None = None
 ) -> Iterator[tuple[Term, dict[str, float]]]:
-    """The orders of a term as terms of their own, each with its standard deviations.
-
-    Yields: one per order, in the order of the series.
-    """
+    """The orders of a term as terms of their own, each with its standard deviations."""
     std, single = dict(std or {}), term.effect.single
     if single is None:
         yield term, std
@@ -78,9 +72,8 @@ def orders_of(term: Term) -> tuple[int, ...]:
 def fundamentals(orders: Sequence[int]) -> tuple[int, ...]:
     """At most two numbers of which every order is a multiple, such as pole pairs and slots.
 
-    ``orders``: orders per turn. Returns: the greatest common divisor where it is above 1; else the
-    smallest order and the greatest common divisor of its non-multiples; empty where that is 1 or
-    there are fewer than 3 orders.
+    The greatest common divisor where it is above 1; else the smallest order and the greatest common
+    divisor of its non-multiples; empty where that is 1 or there are fewer than 3 orders.
     """
     if len(orders) < 3:
         return ()

@@ -19,10 +19,8 @@ _ORDERS_IN_LABEL = 6
 
 
 def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
-    """Apply an effect to the value of its stage.
-
-    ``values``: its parameter values, SI. Returns: of the type and shape of ``value``. Raises
-    FileError with file and line where the function of the effect raises or returns another shape.
+    """Apply an effect with its values (SI) to the value of its stage, whose type and shape remain.
+    Raises FileError with file and line where its function raises or returns another shape.
     """
     try:
         after = effect.apply(value, at, values)

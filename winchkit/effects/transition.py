@@ -47,9 +47,8 @@ def _rounded(direction: Array, rate: Array, transition: float) -> Array:
 
 
 def with_transitions(effect: Effect, transitions: Mapping[str, float]) -> Effect:
-    """An effect with other transitions by default.
-
-    ``transitions``: by the unit of the rate, rad/s or m/s. Returns: with the same law.
+    """An effect with other transitions by default, given by the unit of the rate (rad/s or m/s);
+    its law is the same.
     """
     return replace(
         effect,

@@ -13,9 +13,8 @@ _ROUNDING = 1e-9
 
 
 def broken_promises(effect: Effect) -> list[str]:
-    """Messages on an effect that changes its input at the null or gives no finite values.
-
-    Raises FileError where its function fails.
+    """Messages on an effect that changes its input at the null or gives no finite values. Raises
+    FileError where its function fails.
     """
     # Divisions by zero in a user's function are reported below, not as a warning.
     with np.errstate(all="ignore"):

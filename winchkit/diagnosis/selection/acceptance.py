@@ -53,16 +53,12 @@ def is_accepted(
     noise: BandNoise,
     largest_ratio: float = RELEVANT_RATIO,
 ) -> bool:
-    """Whether a larger model predicts held-out data better.
+    """Whether a larger model predicts held-out data better, by blocks of time or in every group,
+    and some output by ``largest_ratio`` (error after to before) at most.
 
-    ``largest_ratio``: largest ratio of held-out errors, after to before, of at least one output.
-
-    Notes
-    -----
-    The signed-rank test needs many blocks that the effect acts on. An effect that acts in a few,
-    such as those of one type of motion, is accepted where every single held-out group gains more
-    than ln n per parameter. The level of the test is 2 %, without correction for the number of
-    candidates.
+    An effect that acts in few blocks has no significant signed ranks, so that it is also accepted
+    where every held-out group gains more than ln n per parameter. The level of 2 % is not corrected
+    for the number of candidates.
     """
     regression = engine.regression
     blocks = regression.blocks
@@ -94,9 +90,8 @@ def _added(present: Fit, larger: Fit) -> int:
 
 
 def predicts_better(new: Fitted, old: Fitted) -> bool:
-    """Whether a fit predicts held-out blocks of time of some output relevantly better.
-
-    Both fits are of the same runs, with other nuisance parameters or excluded samples.
+    """Whether a fit predicts held-out blocks of time of some output relevantly better than another
+    fit of the same runs, with other nuisance parameters or excluded samples.
     """
     return min(_error_ratios(new, old)) < RELEVANT_RATIO
 

@@ -15,11 +15,7 @@ from winchkit.effects.series import orders_of
 
 
 def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[Score]:
-    """Scores of the candidates that the model does not contain yet, best first.
-
-    A candidate whose best amplitudes are all outside their bounds, such as a negative inertia, gets
-    the score zero.
-    """
+    """Scores of candidates that the model lacks; zero where all amplitudes are out of bounds."""
     signed = [item if _is_feasible(item) else zero_score(item, rows) for item in ranked]
     signed.sort(key=lambda item: -item.net_gain)
     return [item for item in signed if not _is_present(item.candidate.effect, item, present)]

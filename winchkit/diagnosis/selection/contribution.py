@@ -12,12 +12,9 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) -> SelectionResult:
     """The result with its additions in the order of forward selection among themselves.
 
-    The search compares under the noise of each frequency band and exchanges effects: one with sharp
-    changes may come before another that removes more of the error. Here every next addition is the
-    one with which the error is least: the sum of the outputs' held-out mean squares, each in units
-    of the noise.
-
-    Returns: the same model; the result itself where the order is that already.
+    The search weights by the noise of each frequency band and exchanges effects, so that its order
+    is not that of the contributions. Here each next addition leaves the least sum of the outputs'
+    held-out mean squares in units of the noise.
     """
     hypothesis, noise, first = result.final.hypothesis, result.noise, engine.n_initial_terms
     added = list(range(first, len(hypothesis.terms)))

@@ -62,14 +62,8 @@ _KEPT_REFITS = 4
 
 @dataclass(frozen=True)
 class FittedCandidate:
-    """A candidate fitted beside the present effects.
-
-    Attributes
-    ----------
-    fit : Fit
-        All effects refitted.
-    criterion : float
-        χ² + (number of added parameters) · ln n; the lower the better.
+    """A candidate fitted beside the present effects, all refitted; ``criterion`` is χ² + k ln n, k
+    being the number of added parameters.
     """
 
     fit: Fit
@@ -101,23 +95,8 @@ def _effects_of(hypothesis: Hypothesis) -> tuple[Hashable, ...]:
 class SelectionEngine(ABC):
     """Candidates, signatures and comparisons that stay the same through a selection.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    initial_model
-        Initial model: the profile's own effects.
-    candidates
-        Effects that may be added.
-
-    Attributes
-    ----------
-    on_trial : callable
-        Called with the id of every candidate before it is fitted.
-    on_step : callable
-        Called with the model and its noise after each addition; the search ends where it is true.
-    delays_wait : bool
-        Whether delays are no candidates yet.
+    ``on_trial`` is called with the id of every candidate before its fit; ``on_step`` with the model
+    and its noise after each addition, and the search ends where it returns true.
     """
 
     regression: Regression
@@ -143,11 +122,7 @@ class SelectionEngine(ABC):
 
     @abstractmethod
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
-        """Noise estimate beside a fitted model.
-
-        ``residual`` (n_rows,). ``jacobian`` (n_rows, n_unknowns). ``states``: number of initial
-        states, which are the last unknowns.
-        """
+        """Noise estimate beside a fitted model; the initial states are the last unknowns."""
 
     @abstractmethod
     def held_out_errors(self, fitted: Fit, noise: BandNoise, folds: Folds) -> dict[str, float]:
@@ -230,10 +205,8 @@ class SelectionEngine(ABC):
         return ()
 
     def update_signatures(self, present: Hypothesis) -> None:
-        """Compute the signatures beside another model.
-
-        A signature depends on the effects in the model where they act one after another, as a lag
-        does.
+        """Compute the signatures beside another model: those of effects that act one after another,
+        such as a lag, depend on it.
         """
         self._last_projected = LastValue()
         effects = self._absent() if self._extend_grids(present) else []
@@ -248,10 +221,8 @@ class SelectionEngine(ABC):
     def fit_with_noise(
         self, start: Hypothesis, noise: BandNoise | None = None
     ) -> tuple[Fit, BandNoise]:
-        """Fit a hypothesis and estimate the noise from its residual.
-
-        ``noise``: first estimate; by default that of the residual at the starting values. Returns:
-        the fit under the second estimate, and that estimate.
+        """Fit a hypothesis twice: the noise of the first fit's residual weights the second one. By
+        default the first weights are those of the residual at the starting values.
         """
         states = sum(len(own) for own in start.starts)
         if noise is None:
@@ -294,16 +265,8 @@ class SelectionEngine(ABC):
         )
 
     def criterion(self, fitted: Fit) -> float:
-        """Bayesian information criterion of a fit, up to a constant.
-
-        Returns
-        -------
-        float
-            χ² + k ln n, where k counts the parameters and initial states of the added effects.
-
-        References
-        ----------
-        Schwarz, G. (1978). Estimating the dimension of a model. Ann. Stat. 6, 461-464.
+        """Bayesian information criterion of a fit up to a constant (Schwarz 1978): χ² + k ln n,
+        where k counts the parameters and initial states of the added effects.
         """
         return fitted.chi_square + self.penalty(fitted.hypothesis)
 
@@ -327,10 +290,8 @@ class SelectionEngine(ABC):
         """Fit a candidate beside the present effects, without those that it contains.
 
         Of a series law one coefficient after another is added as long as the criterion decreases.
-        A candidate that was fitted beside the same effects before, under another noise estimate,
-        starts from the values found then, unless ``all_starts`` are wanted. Its fit is abandoned
-        where the χ² ``target`` is out of reach, and ends where the smaller ``aim`` is, which
-        decides on a trial that reaches the target.
+        The trial is abandoned where the χ² ``target`` is out of reach, and its fit ends where the
+        smaller ``aim`` is; a repeated trial starts from its last values, unless ``all_starts``.
         """
         goal = None if target is None else RequiredChiSquare(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
@@ -431,10 +392,8 @@ class SelectionEngine(ABC):
         )
 
     def refit(self, hypothesis: Hypothesis, noise: BandNoise, aim: float = np.inf) -> Fit:
-        """Fit a hypothesis under a given noise; the last results are kept.
-
-        It starts from the values found for the same effects before, where these fit better, and
-        ends where the χ² ``aim`` that decides on it is out of reach.
+        """Fit a hypothesis under a given noise, from the last values of the same effects where
+        these fit better; the fit ends where the χ² ``aim`` is out of reach.
         """
         for known, under, aimed, fitted in self._refits:
             if under is noise and known == hypothesis and aimed >= aim:

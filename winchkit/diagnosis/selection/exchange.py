@@ -19,22 +19,12 @@ _MARGIN = 0.1
 
 
 class RivalPlace:
-    """A place in the model that rivals of one effect may take.
+    """A place in the model for rivals of one effect; ``base`` and the scores are without the
+    effect.
 
-    Attributes
-    ----------
-    own : Term
-        The effect at its fitted values.
-    base : Fit
-        The model without it, refitted.
-    scores : list of Score
-        Scores of all candidates beside ``base``.
-
-    Notes
-    -----
-    Without the effect the others are refitted to values that compensate for it, for instance a
-    creep with a shorter time constant in place of a wrong ratio. A rival fitted from there may end
-    in a local minimum, so that it is also started from the others' values in the present model.
+    In ``base`` the others compensate for the effect, for instance a creep with a shorter time
+    constant for a wrong ratio. A rival fitted from there may end in a local minimum, so that it is
+    also started from the others' values in the present model.
     """
 
     def __init__(self, engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> None:
@@ -56,11 +46,11 @@ class RivalPlace:
         return held, least, {item.candidate.effect.id: item for item in scores}
 
     def trial(self, rival: Score, target: float, least: float, aim: float) -> FittedCandidate:
-        """Fit a rival in the effect's place.
+        """Fit a rival in the effect's place, again from the others' present values where its χ² is
+        above ``target`` and would nearly reach it by linear prediction.
 
-        It is fitted again from the others' present values where its χ² is above ``target`` and
-        would nearly reach that value by linear prediction. A fit ends where ``aim``, ``target`` at
-        least, is out of reach. It is abandoned where even the larger χ² ``least`` is.
+        A fit ends where ``aim``, ``target`` at least, is out of reach. It is abandoned where even
+        the larger χ² ``least`` is.
         """
         first_trial = self._engine.trial(self.base, rival, self._noise, target=least, aim=aim)
         if first_trial.fit.chi_square < target or not self._others.terms:
@@ -85,10 +75,7 @@ _MOST_ADDITIONS = 3
 
 
 def pair_exchange(engine: SelectionEngine, present: Fit, noise: BandNoise, exchanged: int) -> Fit:
-    """The present fit, or the best in which a pair replaces ``exchanged`` of its additions.
-
-    ``exchanged``: number of additions to be replaced, one or two.
-    """
+    """The present fit, or the best with a pair in place of one or two (``exchanged``) additions."""
     added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST_ADDITIONS:
         return present  # More than three additions are not replaced by a pair.

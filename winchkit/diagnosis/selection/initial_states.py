@@ -31,13 +31,9 @@ def explained_by_initial_states(
 ) -> bool:
     """Whether the last effect of a fit explains mainly by its initial states.
 
-    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``penalty_per_parameter``: ln n.
-
-    Notes
-    -----
-    False where the effect explains, starting from rest in every run, at least half of its χ² and at
-    least as much as one offset per run; also where its χ² beyond offsets per run exceeds the
-    penalty of all its parameters and states, as under a load that is constant for long.
+    It does not where it explains, from rest in every run, half of its χ² and as much as an offset
+    per run; nor where its χ² beyond such offsets exceeds the penalty of all its parameters and
+    states, as under a load that is constant for long.
     """
     known, residual = base.jacobian * inverse_sigma[:, None], base.residual * inverse_sigma
     gain = base.chi_square - fitted.chi_square
@@ -66,9 +62,8 @@ def _from_rest(regression: Regression, hypothesis: Hypothesis) -> Array:
 
 
 def _levels(regression: Regression, hypothesis: Hypothesis) -> Array | None:
-    """Derivatives by the initial states at the largest time constant, shape (n_rows, n_runs).
-
-    None for an effect without a time constant.
+    """Derivatives by the initial states at the largest time constant, shape (n_rows, n_runs); None
+    for an effect without one.
     """
     term, start = hypothesis.terms[-1], hypothesis.starts[-1]
     largest = {

@@ -45,12 +45,8 @@ def onset_of(effect: Effect) -> Parameter | None:
 def best_onset(
     regression: TimeSeriesRegression, present: Hypothesis, inverse_sigma: Array, effect: Effect
 ) -> tuple[float, float] | None:
-    """Onset of an effect with the largest score, and that score.
-
-    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``effect``: effect with an onset, see
-    :func:`onset_of`, and one amplitude. Returns: time from a run's start, s, and the decrease of χ²
-    by the effect from then on, the unknowns of the model free; None where the data cannot show the
-    effect.
+    """Time from a run's start, s, at which an effect has the largest score, and that score: the
+    decrease of χ² with the unknowns of the model free. None where the data cannot show it.
     """
     parameter = onset_of(effect)
     if parameter is None or regression.missing_needs(effect):
@@ -100,10 +96,8 @@ def _change(
 def _products(
     regression: TimeSeriesRegression, change: Sequence[Array], times: Array, weighted: Array
 ) -> Array:
-    """Inner products of every time's column with a vector of weighted rows, (n_times,).
-
-    A column is the low-passed change from a sample on, so that its product is the sum, from that
-    sample on, of the change times the low-passed vector in time.
+    """Inner products of every time's column with weighted rows, (n_times,): the sum, from a sample
+    on, of the change times the low-passed rows.
     """
     products = np.zeros(len(times))
     for segment, own in zip(regression.segments, change, strict=True):

@@ -1,10 +1,9 @@
 """Spectrum of a residual over the motor angle: least-squares periodogram at whole orders.
 
-Every order from 1 to half the samples per turn, or to 36, is scanned for an effect whose change of
-an output is ``E(t) sin(kθ + p)``: cogging (E constant), ripple of the torque constant (E in
-proportion to the torque), transmission error of a gear. The inner products with the whitened
-residual are exact; the squared lengths of the columns are those under the noise variance at the
-local frequency k θ'/2π.
+Every order is scanned for an effect whose change of an output is ``E(t) sin(kθ + p)``: cogging (E
+constant), ripple of the torque constant (E in proportion to the torque), transmission error of a
+gear. The inner products with the whitened residual are exact; the squared lengths of the columns
+are those under the noise variance at the local frequency k θ'/2π.
 
 References
 ----------
@@ -55,13 +54,7 @@ _TURN = 2 * np.pi
 class Periodogram:
     """Decrease of χ² by a sine of each order, approximately χ²(2) where there is none.
 
-    Attributes
-    ----------
-    orders : ndarray of shape (n,)
-        1, 2, … up to half the samples per turn.
-    power : ndarray of shape (n,)
-        Decrease of χ² by each; zero beyond the band of the comparison, and below three periods
-        where no run has a whole turn.
+    Zero beyond the band of the comparison, and below three periods where no run has a whole turn.
     """
 
     orders: NDArray[np.intp]
@@ -93,11 +86,7 @@ def periodogram(
     residual: Array,
     inverse_sigma: Array,
 ) -> Periodogram:
-    """Periodogram of a residual over the orders of an effect.
-
-    ``effect``: effect with an order, see :func:`has_orders`. ``residual``: measured minus
-    predicted, shape (n_rows,). ``inverse_sigma``: 1/σ of every row, shape (n_rows,).
-    """
+    """Periodogram of a residual (measured minus predicted) over the orders of an effect."""
     first, count = _orders_per_turn(regression)
     if first > count or regression.missing_needs(effect):
         return Periodogram(np.arange(0), np.zeros(0))
@@ -159,16 +148,10 @@ def further_orders(
     inverse_sigma: Array,
     gain: Callable[[Array], float],
 ) -> tuple[Term, ...]:
-    """Further orders of an effect that the residual of a fit contains.
+    """Further orders of an effect in the residual of a fit, by orthogonal matching pursuit.
 
-    ``effect``: effect with an order. ``inverse_sigma``: 1/σ of every row, shape (n_rows,).
-    ``gain``: decrease of χ² that an order must exceed, from the residual (n_rows,): its penalty, or
-    what another effect would explain.
-
-    Notes
-    -----
-    Orthogonal matching pursuit: the order of the largest power is added, all unknowns are
-    projected out of the residual, and the residual is scanned again.
+    An order has to exceed the ``gain`` of the residual: its penalty, or what another effect would
+    explain. All unknowns are projected out before the residual is scanned again.
     """
     hypothesis = fitted.hypothesis
     basis = orthonormal(fitted.jacobian * inverse_sigma[:, None])
@@ -210,10 +193,8 @@ def _envelopes(
     effect: Effect,
     outputs: Collection[str],
 ) -> list[Array]:
-    """E(t) of a change E(t) sin(kθ + p) per segment, of any phase; zero where not compared.
-
-    It is computed from the change by order 1 at both phases, in phase with the angle or, for an
-    effect whose torque is the derivative of its angle, in quadrature.
+    """E(t) of a change E(t) sin(kθ + p) per segment, from order 1 at both phases; zero where not
+    compared. For an effect whose torque is the derivative of its angle it is in quadrature.
     """
     before = regression.change(hypothesis, outputs)
     waves = []
@@ -237,11 +218,11 @@ def _envelopes(
 
 
 def _orders_per_turn(regression: TimeSeriesRegression) -> tuple[int, int]:
-    """Lowest order, and half the samples per turn where the motor moves most slowly; at least 36.
+    """Lowest order, and half the samples per turn where the motor is slowest, at least 36.
 
     Orders of poles and slots that are aliased there are still distinguished by the changes of
-    speed. Where no run covers a whole turn, the lowest order is that of which the longest shows
-    three periods. Zero where none covers half a turn, which leaves an order open by more than two.
+    speed. Without a whole turn the lowest order has three periods in the longest motion; zero where
+    no run covers half a turn, which leaves an order open by more than two.
     """
     # A map of a whole turn ends one step before its beginning.
     angles = [recording.signals.motor_angle for recording in regression.dataset.recordings]

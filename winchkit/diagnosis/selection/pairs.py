@@ -26,18 +26,8 @@ _UNIDENTIFIABLE = 1e-5
 
 @dataclass(frozen=True)
 class Pair:
-    """Two candidates fitted jointly.
-
-    Attributes
-    ----------
-    scores : tuple of two Score
-        Their scores one at a time.
-    explained_ss : float
-        Δχ² of both together.
-    net_gain : float
-        Explained sum of squares minus the penalty of their parameters.
-    single_gain : float
-        Sum of the explained sums of squares one at a time, each at its best grid point.
+    """Two candidates fitted jointly; ``explained_ss`` is Δχ² of both, ``net_gain`` is less the
+    penalty, ``single_gain`` is the sum of Δχ² of each alone at its best grid point.
     """
 
     scores: tuple[Score, Score]
@@ -59,10 +49,7 @@ class Pair:
 def screened_pairs(
     projected: Projected, residual: Array, scores: Sequence[Score], penalty_per_parameter: float
 ) -> list[Pair]:
-    """Pairs of candidates with a positive net gain, best first, each at its best grid points.
-
-    ``residual``: measured minus predicted, shape (n_rows,). ``penalty_per_parameter``: ln n.
-    """
+    """Pairs of candidates with a positive net gain, best first, each at its best grid points."""
     single_gain: dict[str, float] = {}
     for item in scores:
         single_gain[item.candidate.effect.id] = max(

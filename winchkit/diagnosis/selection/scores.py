@@ -47,23 +47,12 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Score:
-    """Score of one candidate.
+    """Score of a candidate at one point of its shape grid; ``explained_ss`` is Δχ², linearised, and
+    ``net_gain`` is less ln n per parameter.
 
-    Attributes
-    ----------
-    candidate : EffectShape
-        The effect at a point of its shape grid.
-    explained_ss : float
-        Decrease of χ², linearised.
-    net_gain : float
-        Explained sum of squares minus ln n per parameter.
-    amplitudes : ndarray of shape (n_columns,)
-        Best amplitudes, in usual-size steps.
-    noncentrality : float
-        λ of one usual size: squared length of its whitened, projected signature.
-    by_chance : float
-        Score that noise alone exceeds for this or any other candidate in at most 1 % of cases, by
-        the degrees of freedom of the noise where this one acts.
+    The amplitudes are in usual-size steps; ``noncentrality`` λ is that of one usual size, the
+    squared length of its whitened, projected signature. Noise alone exceeds ``by_chance`` for any
+    candidate in at most 1 % of cases, by the degrees of freedom of the noise where this one acts.
     """
 
     candidate: EffectShape
@@ -79,14 +68,8 @@ class Score:
 
 
 class Projected:
-    """Signatures with the unknowns of the present model partialled out, under one noise variance.
-
-    ``jacobian``: derivative by the fitted unknowns, shape (n_rows, n_unknowns).
-
-    Attributes
-    ----------
-    inner : ndarray of shape (p, p)
-        Inner products of the whitened, projected columns.
+    """Signatures whitened under one noise variance, the unknowns of the present model partialled
+    out; ``inner`` (p, p) are their inner products.
     """
 
     def __init__(
@@ -142,9 +125,8 @@ class Projected:
         return float(np.min(self._dof_of_column[candidate.columns]))
 
     def _degrees_of_freedom(self) -> Array:
-        """Satterthwaite's degrees of freedom of the variance of every column's amplitude, (p,).
-
-        Its parts are the column's information in the bands.
+        """Satterthwaite's degrees of freedom of the variance of every column's amplitude, (p,),
+        whose parts are the column's information in the bands.
         """
         own = np.einsum("bii->bi", self.signatures.gram)
         mixed = np.einsum("bqi,qi->bi", self._cross, self._through)
@@ -179,9 +161,8 @@ class Projected:
         return out
 
     def _groups(self) -> Iterator[tuple[str, NDArray[np.intp], float]]:
-        """Output, bands and degrees of freedom of noise that is drawn together.
-
-        Bands whose variance is well known are drawn together, the others by themselves.
+        """Output, bands and degrees of freedom of noise that is drawn together: bands whose
+        variance is well known; each other band is drawn by itself.
         """
         outputs = np.array([output for output, _, _ in self._regression.bands])
         for output in self._regression.outputs:
@@ -205,10 +186,8 @@ class Projected:
 
 
 def score_by_chance(penalty: float, columns: int, dof: float, candidates: int) -> float:
-    """Score that noise alone exceeds for one of all candidates in at most 1 % of cases.
-
-    ``candidates``: number of candidates at all points of their shape grids (Bonferroni). Returns: k
-    F(k, ν), its quantile at 1 % over the candidates, less the penalty; at least zero.
+    """Score that noise alone exceeds for one of all candidates in at most 1 % of cases: k F(k, ν)
+    at 1 % over their number (Bonferroni, all grid points), less the penalty; at least zero.
     """
     columns = max(1, columns)
     quantile = columns * float(fdtri(columns, min(dof, _MOST_DOF), 1 - _LEVEL / max(1, candidates)))
@@ -234,11 +213,7 @@ def _cross(regression: Regression, jacobian: Array, signatures: Signatures) -> t
 
 
 def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
-    """Scores of all candidates, best first.
-
-    ``residual``: measured minus predicted, shape (n_rows,). ``rows``: sample size n of the BIC
-    penalty.
-    """
+    """Scores of all candidates, best first; ``rows`` is the sample size n of the BIC penalty."""
     products = projected.products(residual)
     out = []
     for index, explained_ss in enumerate(projected.explained_ss(products).tolist()):
@@ -272,10 +247,7 @@ def zero_score(item: Score, rows: int) -> Score:
 
 
 def null_maxima(projected: Projected, rows: int) -> Array:
-    """Simulated null distribution of the largest score of all candidates, sorted.
-
-    Returns: (400,).
-    """
+    """Simulated null distribution of the largest score of all candidates, sorted, (400,)."""
     candidates = projected.signatures.candidates
     if not candidates:
         return np.zeros(1)

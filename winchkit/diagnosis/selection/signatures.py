@@ -24,18 +24,8 @@ from winchkit.effects.term import Term
 
 @dataclass(frozen=True)
 class EffectShape:
-    """An effect at one point of its shape grid.
-
-    Attributes
-    ----------
-    effect : Effect
-        The effect.
-    shape : dict of str to float
-        Its shape parameters.
-    columns : slice
-        Its columns among the signatures.
-    usual_steps : tuple of dict
-        Values of one usual-size step per column.
+    """An effect at one point of its shape grid, with its columns among the signatures and the
+    values of one usual-size step for each of them.
     """
 
     effect: Effect
@@ -69,25 +59,12 @@ _UNCHANGED = 0.01
 
 @dataclass(frozen=True)
 class Signatures:
-    """Columns of all candidates beside one model.
+    """Columns of all candidates beside one model, and their inner products ``gram`` per noise band.
 
-    Attributes
-    ----------
-    candidates : tuple of EffectShape
-        Effects at their grid points.
-    memory : ndarray of float32, shape (at least p, n_rows)
-        Columns, one after another, with room for more. Single precision, whose rounding is far
-        below the uncertainty of every column; sums over them are in double precision.
-    gram : ndarray of shape (n_bands, p, p)
-        Inner products per noise band.
-    reached : dict of str to ndarray of int
-        Numbers of the columns that change an output.
-    model : Hypothesis
-        Model beside which the columns were computed.
-    without_signature : tuple
-        Effects with usual steps that change nothing beside that model.
-    coarse : ndarray of shape (at least p, coarse rows), optional
-        The columns on the coarse regression, as they were when they were computed on all samples.
+    ``memory`` (at least p, n_rows) has one column after another and room for more. Its single
+    precision rounds far below the uncertainty of every column; sums over it are in double
+    precision. ``coarse`` has the columns on the coarse regression as they were when last computed
+    on all samples.
     """
 
     candidates: tuple[EffectShape, ...]
@@ -156,10 +133,7 @@ def signatures(
     effects: Iterable[Effect],
     coarse: Coarse | None = None,
 ) -> Signatures:
-    """Signatures of candidate effects beside a model.
-
-    ``coarse``: coarse regression, on which later changes of the columns are noticed; None for none.
-    """
+    """Signatures of candidate effects beside a model; ``coarse`` shows later changes of them."""
     writer = _ColumnWriter(regression, present, regression.outputs)
     tried = list(points(regression, effects))
     candidates: list[EffectShape] = []
@@ -207,13 +181,11 @@ def updated_signatures(
     effects: Iterable[Effect] = (),
     coarse: Coarse | None = None,
 ) -> Signatures | None:
-    """Signatures beside another model, computed in the memory of ``previous``.
+    """Signatures beside another model in the memory of ``previous``, which is not valid afterwards.
 
-    Only outputs that changed effects act on are computed again, and of columns that are known on
-    the coarse regression only those which change there by 1 % or more. None where a further
-    column of a candidate appears, or where there is no room for new candidates.
-
-    ``previous``: signatures beside another model; not valid afterwards. ``coarse``: None for none.
+    Only outputs on which changed effects act are computed again, and of columns known on the coarse
+    regression only those that change there by 1 % or more. None where a candidate has a further
+    column, or where there is no room for new candidates.
     """
     changed = [t for t in present.terms if t not in previous.model.terms]
     changed += [t for t in previous.model.terms if t not in present.terms]
@@ -253,9 +225,8 @@ def _with_new_candidates(
     touched: Collection[str],
     new_points: Sequence[Absent],
 ) -> tuple[Signatures, NDArray[np.intp]] | None:
-    """Signatures with candidates that had no column before, and the numbers of their columns.
-
-    None where a candidate that has columns gets a further one, or where there is no room.
+    """Signatures with candidates that had no column before, and the numbers of their columns; None
+    where a candidate that has columns gets a further one, or where there is no room.
     """
     writer, spare = (
         _ColumnWriter(regression, present, touched),
@@ -336,9 +307,8 @@ def _write_columns(
 def _changed_columns(
     found: Signatures, present: Hypothesis, touched: Collection[str], coarse: Coarse | None
 ) -> NDArray[np.bool_]:
-    """Mask of the columns that a new model changes in touched outputs, shape (p,).
-
-    What is known of them on the coarse regression is renewed.
+    """Mask (p,) of the columns that a new model changes in touched outputs, by 1 % or more on the
+    coarse regression, whose columns are renewed.
     """
     count = found.count
     if coarse is None or found.coarse is None:
@@ -360,9 +330,8 @@ def _multiply(
     regression: Regression,
     written: Mapping[str, NDArray[np.intp] | None],
 ) -> None:
-    """Inner products per noise band of some outputs, written into ``gram``.
-
-    ``written``: by output, places of the new columns among those that reach it; None for all.
+    """Write the inner products per band of some outputs into ``gram``: by output those of the new
+    columns among its own, or of all (None).
     """
     for band, (output, _, _) in enumerate(regression.bands):
         own = found.reached[output]

@@ -28,10 +28,8 @@ def shape_at_bound(term: Term) -> bool:
 
 
 def truncated_series(effect: Effect) -> list[Effect]:
-    """The effect with the first coefficient of its series, with the first two, and so on.
-
-    A few loads determine the first coefficient of a law, not the third: undetermined coefficients
-    would run to their bounds. An effect without a series is returned alone.
+    """The effect with the first coefficient of its series, with the first two, and so on: few loads
+    leave the third undetermined, which would run to its bound.
     """
     series = [p for p in effect.parameters if p.role == "shape" and p.low < p.null == 0.0 < p.high]
     out = [effect]
@@ -45,10 +43,8 @@ def truncated_series(effect: Effect) -> list[Effect]:
 
 
 def other_grid_point(term: Term, shape: Mapping[str, float]) -> bool:
-    """Whether a grid point is another local minimum than the values to which a term was fitted.
-
-    An order has one at every grid point; the time of an event has one in every hold, and the best
-    of them may change with the other effects.
+    """Whether a grid point is another local minimum than the fitted values, as for an order, or for
+    the time of an event, which has a minimum in every hold.
     """
     grids = [p for p in term.effect.parameters if p.name in shape and p.grid]
     return any(shape[p.name] != term.values[p.name] for p in grids if p.whole or p.onset)

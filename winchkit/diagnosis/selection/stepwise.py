@@ -59,32 +59,11 @@ _SCORE_LEVEL = 0.99
 
 @dataclass(frozen=True)
 class SelectionResult:
-    """Result of a stepwise selection.
+    """Initial and final model of a stepwise selection, with their noise and lack-of-fit tests.
 
-    Attributes
-    ----------
-    initial_model : Fit
-        The profile's own effects, fitted.
-    initial_noise : BandNoise
-        Noise variance beside the initial model.
-    initial_lack_of_fit_test : LackOfFitTest
-        Lack-of-fit test of the initial model.
-    lack_of_fit_at_start : bool
-        Whether the initial model has a lack of fit.
-    final : Fit
-        The final model.
-    noise : BandNoise
-        Noise variance beside the final model.
-    lack_of_fit_test : LackOfFitTest
-        Lack-of-fit test of the final model.
-    lack_of_fit : bool
-        Whether the final model has a lack of fit.
-    scores : tuple of Score
-        All candidates beside the initial model, best first.
-    tried : tuple of Fit
-        The first of them fitted beside the initial model; empty without a lack of fit.
-    threshold : float
-        Score that noise alone exceeds in 1 % of cases.
+    ``scores`` and ``tried`` (the first candidates, fitted) are beside the initial model, best
+    first; nothing is tried without a lack of fit. Noise alone exceeds ``threshold`` in 1 % of
+    cases.
     """
 
     initial_model: Fit
@@ -181,8 +160,8 @@ def _imitates_rest(
 ) -> bool:
     """Whether a larger model's addition imitates what the laws of the present effects leave.
 
-    Where they leave a hundredth of the excess, in the outputs of the addition, and errors of the
-    size of the noise, the addition has to explain two thirds of it.
+    Where they leave a hundredth of the excess and errors of the size of the noise, the addition has
+    to explain two thirds of it.
     """
     added = [t.effect for t in larger.hypothesis.terms if t.label not in present.labels]
     own = set().union(*(engine.regression.outputs_of(effect.stage) for effect in added))
@@ -219,9 +198,8 @@ def _threshold(engine: SelectionEngine, present: Fit, noise: BandNoise) -> float
 def _has_lack_of_fit(
     lack_of_fit_test: LackOfFitTest, scores: list[Score], threshold: float
 ) -> bool:
-    """Whether the residual contains more than noise.
-
-    With repeats by the lack-of-fit test alone; without repeats by the scores.
+    """Whether a residual exceeds the noise: by the lack-of-fit test or, without repeats, by the
+    largest of the candidates' scores.
     """
     if np.isfinite(lack_of_fit_test.p_value):
         return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
@@ -236,9 +214,8 @@ def _short_list(
     *,
     complete: bool = False,
 ) -> list[FittedCandidate]:
-    """Trials of the five candidates with the largest scores, in their order.
-
-    Unless ``complete``, a trial is abandoned where the best one before is out of reach.
+    """Trials of the five candidates with the largest scores, in their order; unless ``complete``, a
+    trial is abandoned where the best one before is out of reach.
     """
     trials: list[FittedCandidate] = []
     for item in [item for item in scores if item.net_gain > 0][:_SHORT_LIST]:
@@ -250,8 +227,8 @@ def _short_list(
 def _best_pair(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit | None:
     """Best accepted pair where the model has a lack of fit and no single candidate is accepted.
 
-    A pair replaces one of the first additions, or is added in outputs on which no addition acts:
-    pairs beside additions there would be combined to fit an unknown effect.
+    A pair replaces one of the first additions, or is added in outputs without an addition: pairs
+    beside additions there would be combined to fit an unknown effect.
     """
     added = len(present.hypothesis.terms) - engine.n_initial_terms
     if not engine.lack_of_fit_test(present, noise).p_value < _LACK_OF_FIT_LEVEL:
@@ -287,10 +264,8 @@ def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: Ba
 def _accepted_pair_exchange(
     engine: SelectionEngine, present: Fit, noise: BandNoise, against: Fit
 ) -> Fit | None:
-    """A pair in place of one addition that is accepted against another fit; else None.
-
-    No minimum decrease of an error is required: with a lack of fit one effect may nearly replace
-    two.
+    """A pair in place of one addition that is accepted against another fit; else None. No error has
+    to fall: with a lack of fit one effect may nearly replace two.
     """
     better = pair_exchange(engine, present, noise, 1)
     if better is present or not is_accepted(engine, against, better, noise, largest_ratio=1.0):
@@ -305,10 +280,8 @@ def _fits(trials: list[FittedCandidate]) -> tuple[Fit, ...]:
 def _exchange_and_eliminate(
     engine: SelectionEngine, present: Fit, noise: BandNoise
 ) -> tuple[Fit, BandNoise]:
-    """Exchange and eliminate effects until the model does not change.
-
-    The first of two effects may have explained both; its best rival is found only beside the
-    second.
+    """Exchange and eliminate effects until the model does not change: the first of two may have
+    explained both, and its best rival is found only beside the second.
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
@@ -336,10 +309,8 @@ def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: BandNoise) ->
 
 
 def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
-    """The two best candidates for a term's place, and the simpler laws that they contain.
-
-    Before the fit a law with more parameters has a larger score than a simpler one that it
-    contains.
+    """The two best candidates for a term's place, and the simpler laws that they contain, whose
+    scores before the fit are always smaller.
     """
     others = [item for item in scores if item.net_gain > 0 and _another(item, own)]
     best = others[:_RIVALS]
@@ -357,8 +328,8 @@ def _without_minor_terms(
 ) -> tuple[Fit, BandNoise]:
     """Model without additions that explain less than what all of them leave, with repeats.
 
-    Beside so much that is missing they imitate a part of it. Both are excesses of the held-out
-    mean squares over the noise and over what coarse samples add, in units of the noise.
+    Such additions imitate a part of what is missing. Both are held-out excesses over the noise and
+    over what coarse samples add.
     """
     if not noise.from_repeats or len(present.hypothesis.terms) == engine.n_initial_terms:
         return present, noise

@@ -45,17 +45,7 @@ ones are found by the harmonic series and by later scans."""
 
 
 class TimeSeriesSelection(SelectionEngine):
-    """Selection among hypotheses on a winch's runs.
-
-    Parameters
-    ----------
-    regression
-        The runs and the model.
-    initial_model
-        Initial model: the profile's own effects.
-    candidates
-        Effects that may be added.
-    """
+    """Selection among hypotheses on a winch's runs, from the profile's own effects on."""
 
     regression: TimeSeriesRegression
 
@@ -100,10 +90,8 @@ class TimeSeriesSelection(SelectionEngine):
         return held_out_rms(self.regression, fitted, noise, folds)
 
     def _choose_folds(self, fitted: Fit, noise: BandNoise) -> Folds:
-        """Groups of programme and load, or five blocks of time where groups would extrapolate.
-
-        With few groups, say two loads, an unknown may be determined by one group only: its
-        held-out prediction then fails whether or not the effect is present.
+        """Groups of programme and load, or five blocks of time where an unknown is determined by
+        one group only: held-out prediction of that group fails with the effect and without.
         """
         groups = self.regression.groups
         largest = extrapolation(self.regression, fitted, noise, groups)
@@ -144,9 +132,8 @@ class TimeSeriesSelection(SelectionEngine):
     def _extend_grids(self, present: Hypothesis) -> bool:
         """Extend the grids of candidates by significant orders and by the best onset.
 
-        The noise is the residual's own power per band, so that a line is significant only where it
-        exceeds everything else in its band. An order that is significant as one effect is tested
-        as every other that has orders.
+        The noise is the residual's own power per band, so that a line has to exceed everything else
+        in its band. A significant order is tested as every effect that has orders.
         """
         if not any(has_orders(effect) or onset_of(effect) for effect in self._candidates):
             return False

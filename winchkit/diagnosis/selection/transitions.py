@@ -37,10 +37,8 @@ _SMALLEST, _LARGEST = 1e-3, 0.1
 def scanned_transitions(
     engine: TimeSeriesSelection, final: Fit, noise: BandNoise
 ) -> dict[str, float]:
-    """Transitions with which the friction of a model predicts held-out data better.
-
-    Returns: by the unit of the rate, rad/s or m/s; empty where no error falls by 2 % and χ² by ln
-    n.
+    """Transitions, by unit of the rate, with which the friction of a model predicts held-out data
+    better: some error falls by 2 % and χ² by ln n.
     """
     regression, coarse = engine.regression, engine.coarse
     out: dict[str, float] = {}
@@ -99,9 +97,8 @@ def _is_better(engine: TimeSeriesSelection, better: Fit, present: Fit, noise: Ba
 
 
 def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: BandNoise) -> Fit:
-    """The model with the transition of its largest friction over each rate fitted.
-
-    Where it is at its lower bound the friction is sharp, and the given model is returned.
+    """The model with the transition of its largest friction over each rate fitted; the given model
+    where that is at its lower bound, which is sharp friction.
     """
     present = final
     for unit, rate in _highest_rates(engine).items():

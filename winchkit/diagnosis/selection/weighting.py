@@ -39,13 +39,8 @@ class Reweighted:
 
 
 def reweighted(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> Reweighted:
-    """The same hypothesis refitted with equal weights in outputs that these predict better.
-
-    ``fitted``: fit under 1/σ weights.
-
-    Notes
-    -----
-    Intervals under equal weights come from the block jackknife, which does not assume white noise.
+    """The same hypothesis refitted with equal weights in outputs that these predict better than
+    1/σ; their intervals are of the block jackknife, which does not assume white noise.
     """
     own = Reweighted(fitted, noise)
     if noise.from_repeats or not fitted.hypothesis.terms:

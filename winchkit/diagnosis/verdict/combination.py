@@ -38,9 +38,8 @@ def combination_of_set(
 ) -> Combination | None:
     """Combination of parameters that the data determine, whichever member of a set is true.
 
-    ``dataset``: None for a robot. Returns: the cable per motor turn, mean over the runs, for a
-    wrong radius or ratio; the indicated one where the length instrument may be wrong as well. None
-    for other sets: their parameters have no sum.
+    It is the mean cable per motor turn of a wrong radius or ratio, the indicated one where the
+    length instrument may be wrong as well; the parameters of other sets have no sum (None).
     """
     if dataset is None or not {term.effect.id for term in terms} >= _WINDING:
         return None
@@ -52,12 +51,10 @@ def combination_of_set(
 
 
 def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination | None:
-    """Best determined combination of an effect's strongly correlated parameters; None if there are
-    none.
+    """Best determined combination of an effect's strongly correlated parameters; None without any.
 
-    The correlation matrix of the parameters that correlate above 0.9 with another one of the effect
-    has an eigenvector of the smallest eigenvalue; it is scaled to a coefficient of one for the
-    first parameter.
+    It is the eigenvector of the smallest eigenvalue of the correlation matrix of the parameters
+    that correlate above 0.9, scaled to a coefficient of one for the first.
     """
     polar = {name for pair in term.effect.polar_pairs for name in pair}
     fitted = [name for name in Coordinates(term.effect).names if name not in polar]

@@ -33,15 +33,7 @@ _FACTOR = 1
 
 
 class CurveInstead:
-    """Whether one free curve explains what the effects of a search together do not.
-
-    Parameters
-    ----------
-    engine
-        The search.
-    initial
-        Its model before the first addition.
-    """
+    """Whether one free curve explains what the effects of a search from ``initial`` on do not."""
 
     def __init__(self, engine: TimeSeriesSelection, initial: Fit) -> None:
         self._engine, self._initial = engine, initial
@@ -83,9 +75,8 @@ class CurveInstead:
 def with_compensations(
     engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis, steps: Sequence[Step]
 ) -> tuple[Step, ...]:
-    """Steps with the doubt that they may compensate each other.
-
-    ``file``: the effects of the profile at their file values.
+    """Steps with the doubt that they may compensate each other; ``file`` has the profile's own
+    values.
     """
     terms, out = result.final.hypothesis.terms, list(steps)
     ids = [term.effect.id for term in terms]
@@ -175,9 +166,8 @@ class _Together:
         )
 
     def factor(self) -> float | None:
-        """A factor on what the profile predicts that explains as much; None where none does.
-
-        Of an axis only: a winch has a load, by which the torque constant is an effect like others.
+        """A factor on what the profile predicts that explains as much, of an axis only: by a
+        winch's load the torque constant is an effect like others.
         """
         regression, price = self.engine.regression, self.engine.penalty_per_parameter
         if not isinstance(regression.dataset.profile, AxisProfile):

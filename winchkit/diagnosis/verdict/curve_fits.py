@@ -70,9 +70,8 @@ class BasisProducts:
     def root(self, coefficients: Array) -> Array:
         """R (knots, rank): curves of ``coefficients`` (knots, k) decrease χ² by |Rᵀp|².
 
-        p are the inner products of the projected basis functions with the residual. Directions
-        that the fit explains leave rounding only, relative to the lengths before projection; they
-        are left out.
+        p are the inner products of the projected basis functions with the residual. Directions that
+        the fit explains leave only rounding and are left out.
         """
         length = np.diag(coefficients.T @ self.before @ coefficients)
         # A curve that changes nothing has no direction.
@@ -109,9 +108,8 @@ def ranked_curves(
     penalty_per_parameter: float,
     only: Container[tuple[str, str]] | None = None,
 ) -> list[FittedCurve]:
-    """Best curve of every place and variable, that of the largest net decrease of χ² first.
-
-    ``penalty_per_parameter``: penalty per parameter, ln n. ``only``: None for all.
+    """Best curve of every place and variable (of those in ``only``), that of the largest net
+    decrease of χ² first.
     """
     families = curves(regression, outputs, only)
     found = _fitted(regression, partial, families, penalty_per_parameter)

@@ -57,11 +57,9 @@ def verdict_of(
     refuted: Collection[str],
     predictable: Callable[[], bool],
 ) -> Verdict:
-    """Verdict by the table of the errors.
-
-    ``noise_known``: whether the noise is that of repeats or of instruments, and not a lower bound.
-    ``deciding``: outputs that vary by more than their noise. ``predictable``: whether a free curve
-    or an order predicts a tenth of what remains.
+    """Verdict by the table of the errors; noise that is not known from repeats or instruments is a
+    lower bound. The ``deciding`` outputs vary by more than their noise; what remains is
+    ``predictable`` where a free curve or an order predicts a tenth of it.
     """
     counted = {name: output for name, output in outputs.items() if name in deciding}
     at_noise = bool(counted) and all(map(is_at_noise, counted.values()))
@@ -80,9 +78,8 @@ def verdict_of(
 
 
 def is_at_noise(output: OutputFit) -> bool:
-    """Whether the final model's held-out error is as small as the noise.
-
-    In ratio ``AT_NOISE``, or as far as the repeats say what their noise is.
+    """Whether the final model's held-out error is within ``AT_NOISE`` of the noise, or within what
+    the repeats leave open of it.
     """
     if output.noise_rms is None:
         return False
@@ -101,8 +98,8 @@ def remaining_share(outputs: Mapping[str, OutputFit]) -> float:
 def white_noise(regression: TimeSeriesRegression, residual: Array) -> dict[str, float]:
     """Rms of the white noise by output, SI: a lower bound of the noise without repeats.
 
-    The density of the highest quarter of the frequencies of a residual (rows,), at least that of
-    the resolution, over all its frequencies.
+    It is the density of a residual's highest quarter of frequencies over all its frequencies, and
+    at least that of the resolution.
     """
     out = {}
     for output in regression.outputs:
@@ -143,13 +140,11 @@ def measured(
 ) -> OutputEvidence:
     """Outputs that decide on a model, and those that refute it.
 
-    Notes
-    -----
     An output above its noise refutes the model where each run's own mean predicts it better, beyond
     the standard error of the difference over blocks of time, and by more than the variance of the
-    noise: that of a measured input, such as the load, is in the error of the model. An output
-    that does not vary measures nothing where the model of the file says that it must vary, or where
-    its noise is more than a tenth of its level.
+    noise: that of a measured input, such as the load, is in the error of the model. An output that
+    does not vary measures nothing where the model of the file says that it must vary, or where its
+    noise is more than a tenth of its level.
     """
     blocks = regression.blocks
     left = held_out_samples(regression, final, noise, blocks)
@@ -200,9 +195,8 @@ def output_fits(
     final: tuple[Fit, BandNoise],
     folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
-    """Errors of every output before and after, in sample and held out, with its noise.
-
-    ``folds``: None for those that suit the final fit. Returns: by output; rms in SI.
+    """Errors of every output before and after, in sample and held out, with its noise; rms in SI.
+    By default the folds are those of the final fit.
     """
     regression, folds = engine.regression, folds or engine.folds(*final)
     noise, leakage = final[1], StopBandLeakage(regression)

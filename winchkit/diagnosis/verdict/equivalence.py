@@ -3,9 +3,7 @@
 Each rival is refitted in the place of the named effect, under the larger of the noise and of what
 the named model leaves unexplained (quasi-likelihood). It joins the set unless it is worse in
 sample, Δχ² being above the square of a quantile of t (9 for well-known variances), and held out,
-the difference over blocks of time being significant by random signs at 5 %. A law that reduces to
-another member leaves the set again where a likelihood-ratio test does not prefer it. Waves over
-the motor angle join where they differ by the load alone and the runs have one.
+the difference over blocks of time being significant by random signs at 5 %.
 
 References
 ----------
@@ -61,9 +59,8 @@ _LEVEL = 0.05
 class EquivalenceSet:
     """Equivalence set of one addition, in an order that does not depend on noise.
 
-    Effects with the fewest parameters first, of these the ones that the data do not reject against
-    the best of them, those with the fewest measured inputs first, in the order of the
-    catalogue.
+    First are the effects with the fewest parameters; of these those that are not rejected against
+    the best, those with the fewest measured inputs, and then the order of the catalogue.
     """
 
     term: Term
@@ -97,17 +94,13 @@ class EquivalenceSet:
 def equivalence_set(
     engine: SelectionEngine, final: Fit, noise: BandNoise, index: int
 ) -> EquivalenceSet:
-    """Equivalence set of one term of the final model.
+    """Equivalence set of one term; a rival must reach half of the named effect's decrease of χ².
 
-    Notes
-    -----
     All fits are compared under the larger of the noise and of the final model's residual, per band
     (:func:`~winchkit.diagnosis.regression.dispersion.overdispersed`): what the final model leaves
-    unexplained is no evidence for one of two rivals. Of a true and a wrong effect the true one
-    loses more than t² times the variance with probability at most 1/740, t being the quantile for
-    the degrees of freedom of the variances in which the two differ.
-
-    A rival must reach half of the named effect's decrease of χ².
+    unexplained is no evidence for one of two rivals. The true one loses more than t² times the
+    variance with probability at most 1/740, t being the quantile for the degrees of freedom of the
+    variances in which the two differ.
     """
     dispersed = overdispersed(engine.regression, final, noise)
     own_fit = engine.refit(final.hypothesis, dispersed)
@@ -192,9 +185,8 @@ def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: B
 def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> bool:
     """Whether two waves over the motor angle differ by the load only, of which the runs have one.
 
-    A cogging is constant, a ripple of the torque constant and a transmission error are in
-    proportion to the torque. What friction and inertia make of that under one load depends on the
-    side on which they act, which is unknown.
+    A cogging is constant, the others are in proportion to the torque. What friction and inertia
+    make of that under one load depends on the side on which they act, which is unknown.
     """
     known, waves = set(engine.regression.outputs), (own, rival)
     if not all(has_orders(e.single or e) and {*e.outputs} & known == _TORQUE for e in waves):
@@ -207,10 +199,9 @@ def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> b
 def _beside_another(
     engine: SelectionEngine, rival: Fit, members: Sequence[Effect], noise: BandNoise
 ) -> _Member | None:
-    """A rival with the further effect that explains most of what it leaves; None without one.
-
-    The further effect is no member of the set, contains none and reduces to none: that would
-    explain the same without the rival.
+    """A rival with the further effect that explains most of what it leaves; None without one. That
+    effect is no member, contains none and reduces to none: it would explain the same without the
+    rival.
     """
     own = rival.hypothesis.terms[-1]
     for item in engine.scores(rival, noise):
@@ -239,7 +230,7 @@ def _is_listed(own: Effect, rival: Effect) -> bool:
 
 
 def _adds_nothing(rich: _Member, simple: _Member) -> bool:
-    """Whether a law with more parameters is not preferred by a likelihood-ratio test at 5 %."""
+    """Whether a likelihood-ratio test (Wilks) at 5 % does not prefer a law with more parameters."""
     counts = [
         Coordinates(m.term.effect).n_parameters + sum(map(len, m.compared.hypothesis.starts))
         for m in (rich, simple)

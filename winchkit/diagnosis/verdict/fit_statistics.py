@@ -30,14 +30,8 @@ def fit_statistics(
     *,
     profile: WinchProfile | None = None,
 ) -> FitStatistics | None:
-    """Statistics of a fit; None without unknowns.
-
-    ``fit``: the reported model: the effects of ``initial``, then the named ones. ``profile``:
-    profile of the winch, for plausible ranges that are relative to one of its numbers.
-
-    Notes
-    -----
-    The parameter of an order that was scanned counts as an unknown, as in the selection.
+    """Statistics of the reported model: the effects of ``initial``, then the named ones; None
+    without unknowns. A scanned order counts as an unknown, as in the selection.
     """
     if not len(fit.vector):
         return None

@@ -99,9 +99,8 @@ def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise)
 
 
 def _is_missed(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> bool:
-    """Whether a smaller model doubles an error in blocks of time, whatever other groups show.
-
-    A group of another speed may be predicted by values so far outside of theirs that no step helps.
+    """Whether a smaller model doubles an error in blocks of time, whatever other groups show:
+    values may predict a group of another speed so badly that no step helps.
     """
     blocks = engine.regression.blocks
     now, errors = (held_out_rms(engine.regression, m, noise, blocks) for m in (present, smaller))
@@ -111,8 +110,8 @@ def _is_missed(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandN
 def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
-    A shape is determined where the interval of one standard deviation about its value is above zero
-    and ends before its largest plausible value; a series of coefficients where one of them is.
+    It is determined where its interval of one standard deviation is above zero and ends before the
+    largest plausible value; a series where one of its coefficients is.
     """
     shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
     if not shapes:
@@ -139,8 +138,7 @@ def with_simpler_law(engine: SelectionEngine, present: Fit, noise: BandNoise, in
 
 
 def _without_needless(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit | None:
-    """The model without the step whose removal raises the held-out errors least, by 2 % at most.
-
+    """The model without the step whose removal raises the held-out errors least, by 2 % at most;
     None where every step is needed.
     """
     best: tuple[float, Fit] | None = None
@@ -156,9 +154,8 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: BandNoise) -
 def with_first_members(
     engine: SelectionEngine, final: Fit, noise: BandNoise, sets: Sequence[EquivalenceSet]
 ) -> tuple[Fit, list[EquivalenceSet]]:
-    """The model of the first members of all sets, refitted together, and the sets beside it.
-
-    Where it predicts an output worse by more than 2 %, the given model with its own effects first.
+    """The model of the first members of all sets, refitted together, and the sets beside it; the
+    given model where it predicts an output worse by more than 2 %.
     """
     hypothesis, first = final.hypothesis, engine.n_initial_terms
     for index, each in enumerate(sets, start=first):

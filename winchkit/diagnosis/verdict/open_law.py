@@ -1,14 +1,7 @@
-"""Whether the law of a step is open: a free curve explains clearly more than it.
+"""Whether the law of a step is open: a free curve explains clearly more, in its place or beside it.
 
-Curves over one variable (polynomials, linear splines, kinks, powers) speak against a law:
-
-- in place of the step one that explains more by a tenth; a curve over the law's own variable
-  contains the law and explains about as much;
-- beside the step one over the law's own variable that explains a tenth of what the model leaves
-  well above the noise, and more of it than a curve over any other variable: what is left belongs to
-  the law, and its values contain a part of it.
-
-The same curves show whether anything in a residual is predictable at all.
+The curves are polynomials, linear splines, kinks and powers over one variable. They also show
+whether anything in a residual is predictable at all.
 
 References
 ----------
@@ -74,10 +67,11 @@ def variables_of_law(term: Term) -> frozenset[str]:
 def _beside(
     engine: TimeSeriesSelection, final: Fit, noise: BandNoise, index: int
 ) -> OpenLaw | None:
-    """A curve over the law's own variable that explains a tenth of what is left far above noise.
+    """A curve over the law's own variable that explains a tenth of what is left far above the
+    noise.
 
-    Where another variable explains more, what is left is not the law's: at one speed a file the
-    angle follows the speed.
+    What is left belongs to the law, and its values contain a part of it, unless a curve over
+    another variable explains more: at one speed a file the angle follows the speed.
     """
     term = final.hypothesis.terms[index]
     outputs, over = sorted(term.effect.outputs), variables_of_law(term)
@@ -112,9 +106,9 @@ def _better(
 ) -> OpenLaw | None:
     """A curve that explains more than the term at ``index``, in its place.
 
-    None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
-    parameter) and held out. Where the law leaves its outputs above the noise of repeats and a curve
-    does not, the law is open as well.
+    It explains more by a tenth, in sample (beyond a penalty of ln n for every parameter) and held
+    out, since a curve that contains the law explains about as much; or it reaches the noise of
+    repeats where the law does not.
     """
     outputs: list[str] = sorted(final.hypothesis.terms[index].effect.outputs)
     regression, folds = engine.regression, engine.folds(final, noise)
@@ -183,9 +177,9 @@ def _screened(
     outputs: Sequence[str],
     margin: float,
 ) -> list[FittedCurve]:
-    """Curves whose gain exceeds that of a term by the margin in sample, the largest first.
-
-    On the coarse regression first, where there is one: it has all frequencies of a slow curve.
+    """Curves whose gain exceeds that of a term by the margin in sample, the largest first. The
+    coarse regression, which has all frequencies of a slow curve, is screened before all samples
+    are.
     """
     coarse = engine.coarse
     if coarse is not None:

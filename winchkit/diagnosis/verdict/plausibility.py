@@ -27,16 +27,11 @@ def implausible(
 ) -> str | None:
     """Reason why the values of an effect are implausible; None where they are plausible.
 
-    ``profile``: profile of the winch, for ranges that are relative to one of its numbers; None for
-    a robot.
-
-    Notes
-    -----
-    A value is beyond its plausible range where its whole 95 % interval is. Where an effect declares
-    no range, a value at a bound of the fit other than the null is beyond it. A value that the data
-    do not determine (NaN standard deviation) is judged only where the fit held a shape at an end of
-    its range: there the law is that of another effect, such as a spring or an offset of Dahl's. The
-    inertia of an axis has no range: it includes the arm or carriage that the axis moves.
+    A value is beyond its plausible range where its whole 95 % interval is; where no range is
+    declared, a value at a bound of the fit other than the null is. A value that the data do not
+    determine (NaN standard deviation) is judged only where a shape is held at an end of its range:
+    there the law is that of another effect, such as a spring or an offset of Dahl's. The inertia of
+    an axis has no range: it includes the arm or carriage that the axis moves.
     """
     reasons = (
         implausible_value(term.effect.parameter(name), estimate, profile)

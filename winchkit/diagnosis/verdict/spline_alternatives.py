@@ -114,9 +114,8 @@ def curves(
 
 
 def _products(names: Sequence[str], position: str) -> list[tuple[str, str]]:
-    """Products of a factor and a curve: friction by place or load, compliant cables.
-
-    The direction is the expected one of the model: how steep it is, is not tested.
+    """Products of a factor and a curve: friction by place or load, compliant cables. The direction
+    is the expected one of the model: how steep it is, is not tested.
     """
     force = "load" if "load" in names else "tension"
     pairs = (
@@ -136,10 +135,7 @@ def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
 
 
 def linear_splines(values: Array, knots: Array) -> Array:
-    """Linear B-splines over equidistant knots, which add up to one.
-
-    ``values`` (n,). ``knots`` (k,). Returns: (k, n).
-    """
+    """Linear B-splines over equidistant knots, (knots, values), which add up to one."""
     at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
     cell = np.minimum(at.astype(np.intp), len(knots) - 2)
     out, sample = np.zeros((len(knots), len(values))), np.arange(len(values))
@@ -149,10 +145,9 @@ def linear_splines(values: Array, knots: Array) -> Array:
 
 
 def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
-    """Curves over a variable in values at the knots, with the number of parameters of each.
-
-    A curve has a level of its own only as a factor (``level``); otherwise a level is an offset, for
-    which the catalogue has effects.
+    """Curves over a variable in values at the knots, with the number of parameters of each. Only a
+    factor has a level of its own (``level``): any other is an offset, for which the catalogue has
+    effects.
     """
     z = np.linspace(-1.0, 1.0, len(knots))
     out: list[Law] = []

@@ -22,10 +22,8 @@ close)."""
 
 
 def _cable_hysteresis(length: Array, at: At, values: Values) -> Array:
-    """Length less the strain that the cable's internal friction withholds.
-
-    The friction takes half of a change of tension from rest, and all of it right after a full
-    reversal, where the strands stick.
+    """Length less the strain that the cable's internal friction withholds: half of a change of
+    tension from rest, and all of it right after a full reversal, where the strands stick.
     """
     if values["fraction"] == 0.0:
         return length

@@ -92,9 +92,8 @@ _ON_THE_FLANK = 0.98
 def _gear_backlash(path: Path, at: At, values: Values) -> Path:
     """Drum angle behind a backlash, within which the drum stands and a share of the torque acts.
 
-    Within the backlash the motor turns freely, unless the load keeps the teeth on one flank. The
-    friction of the gear determines which of both applies, so that the share is a parameter.
-    For a single state at rest the position within the gap is unknown; it is assumed in contact.
+    The share is a parameter, since the gear's friction determines whether the motor turns freely or
+    the load keeps the teeth on one flank. A single state at rest is assumed in contact.
     """
     gap = values["gap"]
     if gap == 0.0 or len(path.value) < 2:

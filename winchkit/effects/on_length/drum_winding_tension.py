@@ -16,8 +16,8 @@ the parameter and its declared sizes."""
 def apply(length: Array, at: At, values: Values) -> Array:
     """Length plus the difference of strained and unstrained length of the cable on the drum.
 
-    Each piece wound in during the run keeps the strain fraction·T/500 N of that moment. The cable
-    on the drum before has the strain of the run's mean tension, since its own is unknown.
+    Each piece wound in during the run keeps the strain fraction·T/500 N of that moment; the cable
+    on the drum before has that of the run's mean tension, since its own is unknown.
     """
     if values["fraction"] == 0.0:
         return length
@@ -26,10 +26,8 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 
 def stored(wound: Array, strain: Array) -> Array:
-    """Integral of the strain of the cable on the drum over its wound length; m, shape (n,).
-
-    ``wound`` in m since the reference, ``strain`` now at the drum. The drum is a stack: cable
-    wound in last is paid out first, so each monotone section either pushes to or pops from it.
+    """Integral of the strain of the cable on the drum over its wound length; m, shape (n,). The
+    drum is a stack: cable wound in last is paid out first, with the ``strain`` of its winding.
     """
     before = float(np.mean(strain))
     lowest, n = float(np.min(wound)) - 1.0, len(wound)
