@@ -148,8 +148,8 @@ def programme_of(
     operating_range: OperatingRange | None = None,
     repeats: int = 2,
 ) -> Programme:
-    """Motion programme of a kind for ``winchkit run``, by default within the operating range of the
-    runs."""
+    """Motion programme of a kind for ``winchkit run``; the default range is that of the runs so
+    far."""
     operating_range = operating_range or range_of_runs(dataset)
     steps: list[ProgrammeStep] = []
     if kind.temperature_rise:
