@@ -63,11 +63,10 @@ def shared_by_instruments(signal: Array, other: Array) -> Array:
 
 
 def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
-    """Part of each signal that its repeats share, on its own samples.
+    """Part of each signal that its repeats share, on its own samples; zero outside the overlap.
 
-    It is zero where they do not overlap. Only the mean of the other repeats is used: the signal's
-    own noise is in the prediction too, and a remainder of it would be taken for a lag or a
-    hysteresis.
+    Only the mean of the other repeats is used: the signal's own noise is in the prediction too, and
+    a remainder of it would be taken for a lag or a hysteresis.
     """
     if len(signals) < 2:
         return [wiener_filtered(signal) for signal in signals]

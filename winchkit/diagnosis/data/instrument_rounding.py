@@ -40,8 +40,7 @@ def instrument_noise(
 ) -> dict[str, float]:
     """Standard deviation of the noise before the rounding, SI, per rounded channel.
 
-    It is that of the mean variance of the runs: a constant load in the middle of a step shows no
-    noise.
+    It is that of the mean variance of the runs: a constant load in mid-step shows no noise.
     """
     out = {}
     for name, step in resolution.items():

@@ -67,8 +67,7 @@ def find_repeats(
 ) -> list[Repeats]:
     """Partition all runs into sets of repeats.
 
-    ``stated`` is the mass that each run states, kg, also where the model has no cable that carries
-    it.
+    ``stated`` is the mass that each run states, kg, also where no cable of the model carries it.
     """
     masses = stated or [run.load_mass for run in signals]
     sets: list[tuple[list[int], list[float]]] = []

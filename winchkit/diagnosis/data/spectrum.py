@@ -170,8 +170,7 @@ def to_time(coefficients: Array, band: Band) -> Array:
 
 
 def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
-    """Zero-phase 4th-order Butterworth low-pass; half of the amplitude is left at ``cut_off``,
-    Hz."""
+    """Zero-phase 4th-order Butterworth low-pass; ``cut_off``, Hz, leaves half of the amplitude."""
     band = Band(len(signal), rate, cut_off, kept_cut_offs=np.inf)
     return to_time(to_frequency(signal, band), band)
 

@@ -130,8 +130,7 @@ def as_noise(finding: Finding) -> Finding:
 def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
     """Finding ``zeroed-anew`` of the cable length, where an integral of a velocity is the angle.
 
-    The angle is 0 at the start of such a run, wherever the cable was, so that each run has its
-    offset.
+    The angle is 0 at the start of such a run, wherever the cable was: each run has its own offset.
     """
     own = [run for run in runs if run.is_angle_integrated and "cable_length" in run]
     if not own or len(runs) < 2:

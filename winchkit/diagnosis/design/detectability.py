@@ -25,8 +25,10 @@ class DetectionThreshold:
     """1 % level of the largest score under noise alone."""
 
     def required_ss(self, n_parameters: int, by_chance: float = np.inf) -> float:
-        """Decrease of χ² that an effect must reach, by its own threshold ``by_chance`` where that
-        is lower."""
+        """Decrease of χ² that an effect must reach.
+
+        ``by_chance`` is the threshold of this effect alone; the lower threshold counts.
+        """
         threshold = min(self.score_threshold, by_chance)
         return max(threshold, 0.0) + self.penalty_per_parameter * n_parameters
 

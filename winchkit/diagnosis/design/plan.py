@@ -148,8 +148,7 @@ def programme_of(
     operating_range: OperatingRange | None = None,
     repeats: int = 2,
 ) -> Programme:
-    """Motion programme of a kind for ``winchkit run``; the default range is that of the runs so
-    far."""
+    """Motion programme of a kind for ``winchkit run``, by default in the range of the runs."""
     operating_range = operating_range or range_of_runs(dataset)
     steps: list[ProgrammeStep] = []
     if kind.temperature_rise:

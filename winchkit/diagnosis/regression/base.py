@@ -67,8 +67,7 @@ class Regression(ABC):
     """Number of the first nuisance parameters that are offsets of single runs, of instruments that
     were zeroed anew; as initial states they keep their run's values whatever is held out."""
     fits_discretization: bool = False
-    """Whether the last nuisance parameter corrects the discretisation error, which acts through the
-    effects too."""
+    """Whether the last nuisance parameter corrects the discretisation error, also of effects."""
 
     def __init__(self, segments: Sequence[Segment], n_runs: int) -> None:
         self.segments = tuple(segments)

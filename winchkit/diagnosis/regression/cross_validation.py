@@ -132,8 +132,7 @@ def signed_rank_p_value(before: Array, after: Array) -> float:
     """One-sided p-value of the Wilcoxon signed-rank test that the held-out χ² of folds decreased.
 
     It is one with fewer than eight folds or no change. Folds whose change is below 2 % of the
-    largest take no part, unless fewer than eight would remain: an effect may act in a few folds
-    only.
+    largest count only where fewer than eight would remain: an effect may act in a few folds only.
     """
     change = before - after
     size = np.abs(change)

@@ -87,9 +87,8 @@ def _changes(line: Line, recording: Recording) -> dict[str, Array]:
 def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     """Denoised motion of a run, interpolated between its samples.
 
-    None where the derivatives are not differences of these samples: they were taken before a
-    decimation, are the drive's own velocity, which has less noise, or are those of a smoothing
-    spline.
+    None where the derivatives are not differences of these samples, but precede a decimation, are
+    the drive's own velocity, which has less noise, or are those of a smoothing spline.
     """
     signals, smooth, clock = recording.signals, recording.smooth, recording.raw.clock
     if recording.decimated or clock.measured_rate is not None or clock.smoother is not None:
@@ -150,8 +149,8 @@ def interpolated(values: Array) -> Array:
 def _force_correction(recording: Recording, line: Line) -> Array:
     """Force lost by second differences over the span h, (n,): that of x is x″ + h²/12 · x⁗.
 
-    Only the part proportional to the acceleration of the cable, as of a hanging weight, is
-    corrected.
+    Only the part proportional to the acceleration of the cable is corrected, as of a hanging
+    weight.
     """
     signals, tension = recording.signals, recording.smooth.at.tension
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))

@@ -95,8 +95,7 @@ class Fit:
     iterations: int = 0
     """Number of steps that were tried."""
     rank: int = 0
-    """Number of unknowns, less the directions that the data do not determine at the last
-    linearisation."""
+    """Number of unknowns, less the directions that the last linearisation does not determine."""
 
     @cached_property
     def jacobian(self) -> Array:
