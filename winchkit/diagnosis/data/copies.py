@@ -1,8 +1,7 @@
 """Runs that are copies of one another: excerpts, every k-th row, rounded values.
 
-Two recordings of one motion have independent noise, so that their difference has the variance of
-both. A difference far below the noise of one recording alone shows that the two are one recording.
-As repeats of each other they would have a noise floor of nothing.
+Recordings of one motion have independent noise: a difference far below the noise of either shows
+that both are one recording. As repeats of each other they would have no noise floor.
 """
 
 from __future__ import annotations
@@ -72,19 +71,13 @@ class _Recorded:
 def without_copies(
     runs: Sequence[Run], profile: WinchProfile
 ) -> tuple[list[Run], tuple[Finding, ...]]:
-    """Runs without those that are copies of longer ones.
+    """Runs in their order without copies of longer ones; per copy a finding with its copied share.
 
-    Returns: ``kept``: in their order; ``findings``: ``repeats-are-copies`` of every run that was
-    left out; value: the share of its rows that the kept run has.
-
-    Notes
-    -----
-    Rows are compared by their number, so that stamps may differ: at the lag at which the
-    differences of an output correlate most, with every row of the longer run or every k-th. A copy
-    has in every output a median absolute difference, less an offset, below a tenth of the noise of
-    either run. The noise is the smaller of that of the output and of its residual, each from
-    differences of neighbours; an output whose resolution exceeds its noise shows nothing, since
-    independent recordings are rounded alike.
+    Rows are compared by number, since stamps may differ, at the lag at which the differences of an
+    output correlate most, with every row of the longer run or every k-th. A copy has in every
+    output a median absolute difference, less an offset, below a tenth of the noise of either run.
+    An output whose resolution exceeds its noise shows nothing, since independent recordings are
+    rounded alike.
     """
     recorded = [_Recorded(run, profile) for run in runs]
     # The longer one is kept; of equal ones the finer one, which has more different values.

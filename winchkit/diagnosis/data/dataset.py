@@ -197,11 +197,10 @@ def prepare(
 ) -> Dataset:
     """Validate runs and build their data set.
 
-    ``band``: cut-off of the torque's low-pass, Hz; None to choose it from sampling and residuals.
-    ``kept_cut_offs``: coefficients are kept up to this many cut-offs: 1 for fits, more for the rms
-    of a filtered signal, to which the transition band contributes. ``catalogue``: by default all
-    that are installed. Raises RunError with every fault of every run; UsageError if ``band`` is not
-    a positive frequency.
+    ``band`` is the cut-off of the torque's low-pass, Hz; None chooses it from sampling and
+    residuals. ``kept_cut_offs`` is 1 for fits, and more for the rms of a filtered signal, to which
+    the transition band contributes. A RunError has every fault of every run; a UsageError is raised
+    where ``band`` is no positive frequency.
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
@@ -316,10 +315,10 @@ def _removed(runs: Sequence[Run], dataset: Dataset) -> Iterator[RemovedBand]:
 
 
 def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Finding]:
-    """Findings on outputs whose repeats agree to better than their resolution allows.
+    """Findings on outputs whose repeats agree to better than their resolution q allows.
 
-    Repeats that are rounded alike show no noise. That of their rounding, q/√12 for a resolution q,
-    is the least noise of every frequency band; an output of which nothing else is known gets it.
+    The noise of rounding, q/√12, is the least noise of every frequency band, and that of an output
+    of which nothing else is known.
     """
     out = []
     for output in dataset.outputs:
@@ -341,11 +340,8 @@ def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Fin
 
 
 def _repeat_differences(dataset: Dataset, output: str) -> tuple[list[Array], list[Array]]:
-    """Contrasts of the residuals of repeats, (n,) each, and of their temperatures, (2, n).
-
-    The latter are those of the temperature and of its product with the output; zero where the
-    temperatures are equal or not known.
-    """
+    """Contrasts of the residuals of repeats, (n,) each, and of their temperatures and the products
+    of temperature and output, (2, n); zero where temperatures are equal or not known."""
     differences: list[Array] = []
     thermal: list[Array] = []
     for group in dataset.repeated:
@@ -428,11 +424,7 @@ def _separated(dataset: Dataset) -> tuple[tuple[Repeats, ...], list[Finding]]:
 def assemble(
     runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
-    """Build the data set of runs that were validated before.
-
-    ``runs``: valid runs of one winch, at least one. ``filtering``: None to choose the low-pass from
-    the runs.
-    """
+    """Build the data set of runs of one winch that were validated before; at least one run."""
     line, filtering = Line(profile), filtering or Filtering()
     clocks = [_clock(run) for run in runs]
     signals = [_signals(run, profile, clock) for run, clock in zip(runs, clocks, strict=True)]
@@ -535,11 +527,9 @@ def _valid(
 ) -> Mask:
     """Samples of an output that are compared: measured, with known inputs, away from transients.
 
-    A torque at standstills that static friction determines (``still``) is not compared.
-
-    Measured and predicted signals pass the same low-pass after samples that are not compared were
-    set to zero in both. Such samples therefore change no other one, and no further ones are left
-    out beside them but those whose derivatives need them.
+    A torque at standstills that static friction determines (``still``) is not compared. Samples
+    that are not compared are zero in measurement and prediction before the low-pass, so that they
+    change no others.
     """
     compared = np.isfinite(run[output]) & np.isfinite(run["motor_angle"])
     if motion.load is not None and "load" in run:

@@ -1,9 +1,8 @@
 """Decimation of long runs: zero-phase low-pass, then every k-th sample.
 
-An hour at 1 kHz holds millions of samples of motions that take seconds. The signals of the model
-(speed, direction, acceleration) are computed at the full rate and decimated like the measured
-ones, so that a friction force that changes its sign within a millisecond is low-passed alike in
-the measurement and in the prediction. The factor follows from Welch spectra of the channels.
+The signals of the model (speed, direction, acceleration) are computed at the full rate and
+decimated like the measured ones: a friction force that changes its sign within a millisecond is
+low-passed alike in measurement and prediction.
 """
 
 from __future__ import annotations
@@ -56,10 +55,7 @@ class Decimation:
         )
 
     def run(self, run: Run) -> Run:
-        """Decimate a measured run.
-
-        Returns: NaN where more than half of the low-pass window is NaN.
-        """
+        """Decimate a measured run; NaN where more than half of the low-pass window is NaN."""
         pieces = _pieces(run.time)
         channels = {
             name: replace(channel, values=self._decimated_channel(channel.values, pieces))
@@ -128,14 +124,10 @@ def _ordinal(number: int) -> str:
 
 
 def decimation_for(runs: Sequence[Run]) -> Decimation | None:
-    """Decimation that the signals of all runs allow, by one factor.
+    """One decimation of all runs; None where they are short enough, or their signals too fast.
 
-    Returns: None where the runs together are short enough, or the signals too fast.
-
-    Notes
-    -----
-    The factor is the least of: what brings all runs to about 90,000 samples, what keeps 99 % of
-    every channel's power above its white noise below the cut-off, and what leaves 20 Hz.
+    The factor is the least of three: about 90,000 samples of all runs, 99 % of every channel's
+    power above its white noise (Welch spectra) below the cut-off, and a rate of 20 Hz.
     """
     total, rate = sum(map(len, runs)), 1 / max(run.interval for run in runs)
     if total < _LEAST_SAMPLES:

@@ -26,11 +26,10 @@ digits are left."""
 
 
 def half_of_samples_per_turn(angles: Iterable[Array]) -> int:
-    """Highest order that samples of an angle resolve where it turns most slowly.
+    """Highest order that samples of an angle resolve where it turns most slowly; at most 1000.
 
-    ``angles``, iterable of (n,) arrays: one for each run, rad. Returns: half of the samples of the
-    slowest whole turn (of the slowest motion where there is no whole turn), at most 1000; 0 where
-    nothing moves.
+    It is half of the samples of the slowest whole turn, or of the slowest motion where there is no
+    whole turn, and 0 where nothing moves. ``angles`` holds one array (n,) for each run, rad.
     """
     step = np.sort(np.abs(np.concatenate([np.zeros(1), *(np.diff(angle) for angle in angles)])))
     step = step[step > 0]
@@ -45,13 +44,8 @@ def sums_by_order(
 ) -> NDArray[np.complex128]:
     """Sums Σ x exp(ikθ) over samples, for the orders k from 1 to ``highest``, (highest,).
 
-    ``angle``, ``values`` (n,): angles θ, rad, and what is summed, x. ``resolved``: order of whose
-    period a cell is a thirty-second. ``highest``: highest order.
-
-    Notes
-    -----
-    The samples are summed within equal cells of the turn, and these by one Fourier transform; the
-    phase of a sample is that of the middle of its cell.
+    Samples are summed within cells of a thirty-second of the period of the order ``resolved``, at
+    the phase of the cell's middle, and these sums by one Fourier transform.
     """
     cells = _CELLS * resolved
     cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
@@ -61,15 +55,10 @@ def sums_by_order(
 
 
 def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, float] | None:
-    """The order up to ``orders`` whose sine explains most of a residual, and its share.
+    """The order up to ``orders`` whose sine explains most of a residual, and its exact share.
 
-    ``angle``, ``error`` (n,): angle, rad, and what is explained. ``orders``: highest order; the
-    lowest is that of which the motion holds two whole periods. Returns: None where there is no
-    residual, or no order is identifiable: the angle hardly moves.
-
-    Notes
-    -----
-    All orders are compared by :func:`sums_by_order`; the share of the best one is exact.
+    The motion holds two whole periods of the lowest order. None stands for no residual, or for an
+    angle that hardly moves.
     """
     total = float(error @ error)
     if total == 0.0 or not orders:
@@ -95,10 +84,8 @@ def _lowest_order(angle: Array) -> int:
 
 
 def _explained(toward: NDArray[np.complex128], twice: NDArray[np.complex128], count: int) -> Array:
-    """Sum of squares that cosine and sine of each order explain; zero where not identifiable.
-
-    From the sums of e exp(ikθ) and of exp(2ikθ) over ``count`` samples, complex, (orders,).
-    """
+    """Sum of squares that cosine and sine of each order explain, from the sums of e exp(ikθ) and of
+    exp(2ikθ), (orders,); zero where not identifiable."""
     normal = np.empty((len(twice), 2, 2))
     normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
     normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2

@@ -1,10 +1,8 @@
 """Denoising of measured inputs (errors in variables), on which changes by effects are evaluated.
 
-A measured load, torque or temperature carries noise of its own. What an effect changes is evaluated
-on the part of it that repeats share, by a Wiener filter per frequency band; without repeats on the
-part that another instrument shares (the tension with the torque, the load with the tension), or,
-where there is none, above the white noise floor. Otherwise that noise acts like a lag or a
-hysteresis.
+An input's own noise acts like a lag or a hysteresis. A Wiener filter per frequency band keeps what
+repeats share; without repeats what another instrument shares (the tension with the torque, the load
+with the tension), or, where there is none, what exceeds the white noise floor.
 
 References
 ----------
@@ -32,11 +30,10 @@ _FLOOR_SHARE = 1 / 3
 
 
 def contrasts(aligned: Array) -> tuple[Array, Array]:
-    """Mean part and Helmert contrasts of repeats, each with the variance of one repeat's noise.
+    """Mean part of m repeats, (m, ...), and their Helmert contrasts, (m − 1, ...).
 
-    ``aligned`` (m, ...): values of m repeats. Returns: ``mean`` (...): the sum divided by √m;
-    ``differences`` (m − 1, ...): (x₁ + … + x_j − j x_{j+1}) / √(j (j + 1)): orthogonal to the mean
-    and to each other.
+    The mean part is the sum over √m, a contrast (x₁ + … + x_j − j x_{j+1}) / √(j (j + 1)):
+    orthogonal to each other, and each with the variance of one repeat's noise.
     """
     m = len(aligned)
     mean = aligned.sum(axis=0) / np.sqrt(m)
@@ -56,25 +53,20 @@ def wiener_filtered(signal: Array) -> Array:
 
 
 def shared_by_instruments(signal: Array, other: Array) -> Array:
-    """Part of a signal that another instrument of the same quantity shows too.
+    """Part of a signal that another instrument of the same quantity, in the same unit, shows too.
 
-    ``signal``, ``other`` (n,): readings of the two, whose noise is independent, in one unit.
-    Returns (n,): the signal, each band scaled by the cross power of both over its own: the Wiener
-    gain, since only the quantity is in both (instrumental variable).
+    Each band is scaled by the cross power of both over the signal's own: the Wiener gain, since the
+    noise of the two is independent (instrumental variable).
     """
     own, beside = (np.asarray(dct(x, type=2, norm="ortho")) for x in (signal, other))
     return _band_filtered(own, own**2, own**2 - own * beside, beside**2)
 
 
 def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
-    """Part of each signal that its repeats share, on its own samples.
+    """Part of each signal that its repeats share, on its own samples; zero outside the overlap.
 
-    ``signals``: one array per repeat. Returns: zero where the repeats do not overlap.
-
-    Notes
-    -----
-    A signal's own noise takes no part: only the mean of the *other* repeats is used. The same noise
-    is in the prediction, and a remainder of it would be taken for a lag or a hysteresis.
+    Only the mean of the other repeats is used: the signal's own noise is in the prediction too, and
+    a remainder of it would be taken for a lag or a hysteresis.
     """
     if len(signals) < 2:
         return [wiener_filtered(signal) for signal in signals]
@@ -92,10 +84,8 @@ def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]
 
 
 def _band_filtered(full: Array, power: Array, noise: Array, other: Array | None = None) -> Array:
-    """Inverse transform with each band scaled by the share of its power that is not noise.
-
-    ``other`` is the power of another instrument, where the share is that of a cross power.
-    """
+    """Inverse transform with each band scaled by the share of its power that is not noise, or by
+    that of the cross power with ``other``."""
     edges = band_edges(np.arange(len(full), dtype=float), 1)
     gain = np.ones_like(full)
     for low, high in pairwise(edges):
@@ -120,17 +110,12 @@ def denoised_motions(
 ) -> list[Motion]:
     """Motions with denoised cable force, motor torque and temperature, one per run.
 
-    ``signals``, ``motions``: measured inputs and the motion computed from them, one each per run.
-
-    Notes
-    -----
-    The acceleration of the cable is the part that repeats share. A measured force is its regression
-    on that acceleration plus the part of the remainder that repeats, or two instruments, share; the
-    force of a known weight follows the acceleration alone; known weights on a winch at rest are
-    used as they are, since a filter would smooth their steps. Of a measured torque it is the part
-    that repeats share. The error of finite differences in
-    the acceleration is estimated from a measured force; with a known weight it is a nuisance
-    parameter of the fit.
+    The acceleration of the cable and a measured torque become the part that repeats share. A
+    measured force becomes its regression on that acceleration plus the part of the remainder that
+    repeats, or two instruments, share. The force of a known weight follows the acceleration alone;
+    on a winch at rest it is used as it is, since a filter would smooth its steps. The error of
+    finite differences in the acceleration is estimated from a measured force; with a known weight
+    it is a nuisance parameter of the fit.
     """
     out = list(motions)
     for group in repeats:
@@ -188,10 +173,8 @@ def _denoised(values: Sequence[Array], group: Repeats) -> list[Array]:
 def _forces(
     line: Line, signals: Sequence[Signals], regressors: Sequence[Array], group: Repeats
 ) -> list[Array | None]:
-    """Denoised cable force of every run of a group; None where it is not known.
-
-    ``regressors`` (n, 2) hold the force of a unit weight and its correction for finite differences.
-    """
+    """Denoised cable force of every run, None where it is not known; ``regressors`` (n, 2) are the
+    force of a unit weight and its correction for finite differences."""
     measured = [s.load if s.load is not None else s.tension for s in signals]
     known = [s.load_mass if s.load is None else None for s in signals]
     if all(mass is not None for mass in known):

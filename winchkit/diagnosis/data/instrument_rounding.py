@@ -1,8 +1,7 @@
 """Rounding errors of a run's instruments in its outputs: of the output itself, and of an input.
 
-A measured load or tension is an input of what is predicted from it: its rounding error, times the
-derivative of the prediction by the force, is an error of the prediction, and equal motions share
-it.
+The rounding error of a measured load or tension, times the derivative of the prediction by the
+force, is an error of the prediction, and equal motions share it.
 """
 
 from __future__ import annotations
@@ -25,34 +24,23 @@ _WINDOW = 25
 
 @dataclass(frozen=True)
 class RoundingError:
-    """Error of an output by the rounding of one instrument.
-
-    Attributes
-    ----------
-    instrument : str
-        Channel that is rounded; the zero of its steps is the same in all runs.
-    components : ndarray of shape (2 × harmonics, n)
-        Cosine, then sine components of the harmonics of the mean error, see
-        :func:`~winchkit.runs.sanity.rounding.mean_error`, at the samples of the run.
-    white : float
-        Variance of the rest of the output's own error. Of an input it is zero: that of repeats is
-        in their differences.
-    """
+    """Error of an output by the rounding of one instrument."""
 
     instrument: str
+    """Channel that is rounded; the zero of its steps is the same in all runs."""
     components: Array
+    """Cosine, then sine components of the mean error's harmonics, (2 × harmonics, n)."""
     white: float
+    """Variance of the rest of the output's own error; zero of an input, whose rest is in the
+    differences of repeats."""
 
 
 def instrument_noise(
     recordings: Sequence[Recording], resolution: Mapping[str, float]
 ) -> dict[str, float]:
-    """Standard deviation of the noise of instruments before their rounding.
+    """Standard deviation of the noise before the rounding, SI, per rounded channel.
 
-    ``resolution``: resolution by channel, SI. Returns: one value per rounded channel, SI, by the
-    mean over the runs of the variance after the rounding. That of one run depends on where its
-    signal lies between two steps: under a constant load in the middle of a step no noise is visible
-    at all.
+    It is that of the mean variance of the runs: a constant load in mid-step shows no noise.
     """
     out = {}
     for name, step in resolution.items():
@@ -72,11 +60,9 @@ def rounding_errors(
     noise: Mapping[str, float],
     change: Array | None = None,
 ) -> Iterator[RoundingError]:
-    """Rounding errors in an output of a run.
+    """Rounding errors in an output of a run, from the noise of the channels before their rounding.
 
-    ``noise``: noise of the rounded channels before their rounding, SI (:func:`instrument_noise`).
-    ``change`` (n,): change of the output by effects, SI: the rounding error is a function of the
-    whole signal.
+    They are functions of the whole signal, ``change`` by effects included, (n,), SI.
     """
     recording, resolution = dataset.recordings[run], dataset.resolution
     predicted = recording.nominal_smooth[output]

@@ -64,8 +64,8 @@ class UnfilteredOutput:
     def highest_frequency(self, runs: int, lost: float = 0.0) -> float:
         """Highest frequency at which both the measured output and its error exceed white noise, Hz.
 
-        Noise of a measured angle makes the predicted inertial torque, and so the error alone,
-        exceed white noise at high frequencies.
+        The error alone exceeds it at high frequencies, where the predicted inertial torque has the
+        noise of a measured angle.
         """
         return min(
             highest_frequency(values, self.rate, runs, lost)
@@ -76,10 +76,9 @@ class UnfilteredOutput:
 def torque_cut_off(runs: Sequence[UnfilteredOutput], speed: float, lost: float = 0.0) -> float:
     """Cut-off of the torque's low-pass, Hz, the same for all runs of a sampling rate.
 
-    ``runs``: torque of every such run, at least one. ``speed``: highest speed of the motor, rad/s.
-    Returns: 1.5 times the frequency of the highest order of a candidate at that speed, 20 Hz at
-    least and 0.4 of the sampling rate at most. Where all above it is white noise, the
-    highest frequency at which a torque exceeds its noise, or 20 Hz or a tenth of the rate.
+    It is the lowest of three: the highest frequency at which a torque exceeds its white noise (20
+    Hz or a tenth of the rate at least), 1.5 times the frequency of the highest order of a candidate
+    at the motor's highest ``speed`` in rad/s (20 Hz at least), and 0.4 of the sampling rate.
     """
     rate = min(run.rate for run in runs)
     usual = min(_TORQUE_BAND, rate / 10)
@@ -96,8 +95,8 @@ def cut_offs_of(
 ) -> list[float | None]:
     """Cut-off of the torque's low-pass of every run, Hz; None for a run without a torque.
 
-    Runs of one sampling rate have the same. The acceleration of a known weight by differences of
-    samples is too small at high frequencies: 1 % of the power may lie above the cut-off there.
+    The acceleration of a known weight by differences of samples is too small at high frequencies: 1
+    % of the power may lie above the cut-off there.
     """
     compared = {
         index: UnfilteredOutput(
@@ -166,10 +165,8 @@ def removed_by_low_pass(
 ) -> RemovedBand:
     """What a low-pass with a cut-off in Hz removes from the errors of an output in all runs.
 
-    Notes
-    -----
-    The density of the white noise is that of the upper half of the frequencies, from the median of
-    the squared coefficients of the cosine transform.
+    The white noise is that of the upper half of the frequencies, from the median of the squared
+    coefficients of the cosine transform.
     """
     angles, removed, noise = [], [], 0.0
     for run in runs:

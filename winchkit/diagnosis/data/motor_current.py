@@ -13,8 +13,8 @@ from winchkit.schema.profiles.winch import WinchProfile
 def with_torques(runs: Sequence[Run], profile: WinchProfile) -> list[Run]:
     """Runs with a motor torque where only the motor current was recorded.
 
-    ``profile``: profile with ``motor.torque_constant``, N m/A. Raises RunError where a run has a
-    current and nothing else to compare, and the profile no torque constant.
+    A RunError names a run with a current and nothing else to compare where the profile has no
+    ``motor.torque_constant``.
     """
     faults: list[Fault] = []
     out = [_with_torque(run, profile, faults) for run in runs]

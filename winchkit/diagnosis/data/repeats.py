@@ -1,13 +1,12 @@
 """Detection of repeats (replicate runs) and alignment of their clocks.
 
-Two runs are repeats when their aligned motor angles agree to 2 % of their standard deviation and
-their mean loads agree to 2 %. Clocks are aligned by the lag of least mean-square difference.
-
-Repeats have the same recorded inputs, so that every model predicts the same outputs for them. A run
-that its nearest repeat predicts no better than the profile does, while the others predict each
-other, was made under another value of something that is not recorded, such as the zero of the
-angle. Taken for noise, this difference would hide all effects. Several such runs that predict each
-other are repeats of each other, such as those under another weight that is not stated.
+Two runs are repeats when their motor angles, aligned by the lag of least mean-square difference,
+agree to 2 % of their standard deviation and their mean loads to 2 %. Repeats have the same recorded
+inputs, so that every model predicts the same outputs for them. A run that its nearest repeat
+predicts no better than the profile does, while the others predict each other, was made under
+another value of something that is not recorded, such as the zero of the angle; taken for noise,
+this difference would hide all effects. Several such runs that predict each other are repeats of
+each other.
 
 References
 ----------
@@ -68,8 +67,7 @@ def find_repeats(
 ) -> list[Repeats]:
     """Partition all runs into sets of repeats.
 
-    ``signals``: measured inputs, one per run. ``stated``: mass that each run states, kg, also where
-    the model has no cable that carries it.
+    ``stated`` is the mass that each run states, kg, also where no cable of the model carries it.
     """
     masses = stated or [run.load_mass for run in signals]
     sets: list[tuple[list[int], list[float]]] = []
@@ -127,10 +125,8 @@ def _shift(first: Signals, other: Signals) -> float | None:
 
 
 def _best_lag(a: Array, b: Array) -> int:
-    """Lag of least mean-square difference, in samples by which ``b`` is behind ``a``.
-
-    Not the lag of largest correlation, which is wrong where a log begins or ends in motion.
-    """
+    """Lag of least mean-square difference, in samples by which ``b`` is behind ``a``; the lag of
+    largest correlation is wrong where a log begins or ends in motion."""
     lags = np.arange(1 - len(a), len(b))
     start, stop = np.maximum(0, -lags), np.minimum(len(a), len(b) - lags)
     mean = a.mean()
@@ -194,16 +190,13 @@ class Outlying:
 
 
 def outlying_repeat(errors: Array) -> Outlying | None:
-    """The repeat that differs most from the others, if that is significant.
+    """The repeat, of at least three, that differs most from the others, if that is significant.
 
-    ``errors`` (m, n): residuals of one output of m repeats on corresponding samples; NaN where not
-    compared. Returns: None for fewer than three repeats.
-
-    Notes
-    -----
-    Mean squares of differences less their mean. That of a run from its nearest repeat over the
-    median of the same of the others is tested by F at 10⁻³ over all repeats (Bonferroni). A
-    variance estimate from coefficients c of a cosine transform has 3 (Σc²)²/Σc⁴ degrees of freedom.
+    ``errors`` are residuals of one output of m repeats on corresponding samples, (m, n), NaN where
+    not compared. The mean square of the differences of a run from its nearest repeat, less their
+    mean, over the median of the same of the others is tested by F at 10⁻³ over all repeats
+    (Bonferroni). A variance estimate from coefficients c of a cosine transform has 3 (Σc²)²/Σc⁴
+    degrees of freedom.
     """
     count = len(errors)
     if count < _LEAST_REPEATS:
@@ -224,7 +217,7 @@ def outlying_repeat(errors: Array) -> Outlying | None:
 def separated(group: Repeats, errors: Array) -> list[Repeats]:
     """Repeats in sets whose members predict each other.
 
-    ``errors`` (m, n): as of :func:`outlying_repeat`. Returns: one set, unless the nearest runs of
+    ``errors`` are those of :func:`outlying_repeat`. There is one set, unless the nearest runs of
     two sets differ by more than all runs from the nearest of their own set, by the same test, and
     by more than the profile leaves of one of the runs.
     """
@@ -251,10 +244,8 @@ def separated(group: Repeats, errors: Array) -> list[Repeats]:
 def excluded_alike(
     repeats: Sequence[Repeats], valid: Sequence[Mapping[str, NDArray[np.bool_]]]
 ) -> list[Mapping[str, NDArray[np.bool_]]]:
-    """Masks by output of every run, in which repeats exclude what any of them excludes.
-
-    Else their difference there is what the model leaves, and counts as noise.
-    """
+    """Masks in which repeats exclude what any of them excludes: else their difference there is what
+    the model leaves, and counts as noise."""
     out = [dict(own) for own in valid]
     for group in repeats:
         members = list(zip(group.runs, group.rows, strict=True))

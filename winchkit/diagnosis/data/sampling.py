@@ -36,11 +36,7 @@ _MOST_BINS = 8_000_000
 
 
 def bridged(values: Array) -> Array:
-    """Interpolate missing values (NaN) linearly over the index.
-
-    ``values`` (n,). Returns (n,): ``values`` itself where none is missing; the nearest value beyond
-    the first and the last.
-    """
+    """Values with missing ones (NaN) interpolated linearly; the nearest value beyond both ends."""
     known = np.isfinite(values)
     if known.all():
         return values
@@ -54,10 +50,7 @@ def bridged_channel(run: Run, name: str) -> Array | None:
 
 
 def gaps(time: Array) -> NDArray[np.intp]:
-    """Indices of the last samples before gaps, (k,).
-
-    ``time`` (n,): s, increasing.
-    """
+    """Indices of the last samples before gaps, (k,)."""
     steps = np.diff(time)
     return np.flatnonzero(steps > _GAP * np.median(steps))
 
@@ -65,12 +58,9 @@ def gaps(time: Array) -> NDArray[np.intp]:
 def even_instants(time: Array, angle: Array) -> Array | None:
     """Even sampling instants of a run whose stamps jitter, some of them missing.
 
-    A logger may sample evenly and stamp late, or sample whenever it has time. The angle decides:
-    it is a smooth motion over the times at which it was sampled.
-
-    ``time`` (n,): stamps, s, increasing. ``angle`` (n,): motor angle, rad. Returns (n,): instants,
-    s; None where the stamps are even but for lost samples, or where the restricted likelihood of
-    the smoothing spline is larger over the stamps.
+    None is returned where the stamps are even but for lost samples, or where the restricted
+    likelihood of the angle's smoothing spline is larger over the stamps: a logger may sample evenly
+    and stamp late, or sample whenever it has time.
     """
     if SamplingTimes(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
         return None
@@ -139,11 +129,8 @@ def at_new_angles(runs: Sequence[Run], findings: Iterable[Finding]) -> tuple[lis
 
 
 def away_from(unknown: Mask, reach: int) -> Mask:
-    """Samples whose differences over ``reach`` samples use no unknown one, (n,).
-
-    ``unknown`` (n,) of bool: samples without a value. All samples beyond both ends of a run are
-    unknown too.
-    """
+    """Samples whose differences over ``reach`` samples use no unknown one, (n,); samples beyond
+    both ends of a run are unknown too."""
     padded = np.pad(unknown, reach, constant_values=True).astype(float)
     return np.convolve(padded, np.ones(2 * reach + 1), mode="valid") < 0.5
 

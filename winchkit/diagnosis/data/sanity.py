@@ -74,9 +74,8 @@ def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
 def usable(inspected: Inspection) -> Run:
     """The run without what findings exclude.
 
-    Single spikes are NaN, so that they are not compared, as are the outputs where the load does not
-    hang on the cable. A velocity that is not the derivative of the motor angle is left out: the
-    rate is then that of the angle.
+    Single spikes are NaN, as are outputs where the load does not hang on the cable. A velocity that
+    is not the derivative of the motor angle is left out: the rate is then that of the angle.
     """
     run = _with_derived_velocity(inspected)
     channels: dict[str, Channel] = dict(run.channels)

@@ -1,15 +1,12 @@
 """Sign and scale of measured channels against the prediction of a profile.
 
-Every run's tension and torque are regressed on their prediction; a slope far from one is no effect
-of a winch, but a wrong unit, factor or sign of a channel. The standard deviation of the slope is
-that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside; a
-run whose motion does not separate them from the load, as one in one direction, has the slope of all
-runs together. A prediction that is friction and inertia alone, as of an axis without a load, has no
-slope of its own: a wrong unit and another inertia are the same there, but a correlation below −0.9
-is an inverted sign. A factor is the same in all
-runs, or in some and the others have none: where the slopes of the others differ from each other, as
-with an offset for every run, none is suspected. Without a load the prediction of the torque may
-vanish: then the work of its dissipative part must not be negative (passivity).
+Every run's tension and torque are regressed on their prediction, with the standard deviation of a
+block jackknife; a slope far from one is a wrong unit, factor or sign. Friction and inertia are
+fitted beside; a run whose motion does not separate them from the load has the slope of all runs
+together. A prediction that is friction and inertia alone has no slope of its own, but a correlation
+below −0.9 is an inverted sign. A factor is the same in all runs, or in some while the others have
+none; where the slopes of the others differ, none is suspected. Without a load the prediction of the
+torque may vanish: then the work of its dissipative part must not be negative (passivity).
 
 References
 ----------
@@ -79,8 +76,8 @@ def sign_and_scale(
 ) -> list[Finding]:
     """Findings ``inverted-sign`` and ``wrong-factor`` of tension, torque and load.
 
-    ``catalogue``: by default all that are installed. Returns: value: slope of measured over
-    predicted. Where tension and torque of a run are wrong by the same factor, the load is.
+    Their value is the slope of measured over predicted. Where tension and torque of a run are wrong
+    by the same factor, the load is.
     """
     wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
     every = _slopes(runs, profile, catalogue)
@@ -101,11 +98,9 @@ def sign_and_scale(
 
 
 def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
-    """What explains a wrong slope of the cable length over its prediction, in words.
+    """Words on a wrong slope of the cable length over its prediction; empty if nothing explains it.
 
-    ``slope_at``: the same with the motor angle multiplied by a factor: a drum that winds in layers
-    is not linear. Returns: ``inverted sign of 'cable_length' or 'motor_angle'``; empty where
-    nothing known explains it.
+    ``slope_at`` gives the slope with a factor on the motor angle: a drum with layers is not linear.
     """
     either = "'cable_length' or 'motor_angle'"
     if slope < 0 and not _outside(abs(slope)):
@@ -125,11 +120,8 @@ def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
 
 
 def mending_column(finding: Finding) -> str:
-    """Value of ``import --column`` that corrects a channel with a wrong sign or unit.
-
-    ``finding``: of :func:`sign_and_scale`. Returns: ``motor_torque=-motor_torque*0.1 [N m]``; empty
-    for the load, which may be metadata.
-    """
+    """Value of ``import --column`` that corrects a channel with a wrong sign or unit, such as
+    ``motor_torque=-motor_torque*0.1 [N m]``; empty for the load, which may be metadata."""
     channel, slope = finding.channel, finding.value
     if channel not in OUTPUT_UNITS:
         return ""
@@ -198,8 +190,8 @@ def _rows(
 def _suspects(run: Run, slopes: Mapping[str, Slope]) -> dict[tuple[str, str], Slope]:
     """Channels with a wrong sign or scale, and the channel that may be wrong instead.
 
-    The load where tension and torque agree on one; tension or torque where no load is known, since
-    the one is predicted from the other.
+    That is the load where tension and torque agree on one; tension or torque where no load is
+    known, since the one is predicted from the other.
     """
     wrong = {name: s for name, s in slopes.items() if _is_wrong(s)}
     if len(wrong) == 2:
@@ -227,8 +219,8 @@ def _reciprocal(slope: Slope) -> Slope:
 def _is_wrong(slope: Slope) -> bool:
     """Whether a slope is negative or outside the range of effects, beyond its uncertainty.
 
-    A factor also explains what was measured: values without any relation to the prediction have a
-    slope by their mean.
+    Values without any relation to the prediction have a slope by their mean: the factor must also
+    explain what was measured.
     """
     low, high = abs(slope.value) - _SIGMAS * slope.std, abs(slope.value) + _SIGMAS * slope.std
     is_factor = slope.explained >= _LEAST_EXPLAINED and (low > _LARGEST or high < 1 / _LARGEST)
@@ -238,9 +230,8 @@ def _is_wrong(slope: Slope) -> bool:
 def _differ(slopes: Sequence[Slope]) -> bool:
     """Whether the slopes that are not wrong differ from run to run, or the units of the others.
 
-    A channel has one unit in all runs: two units are none, but an effect that is missing. They
-    are two where the slopes differ beyond their uncertainty. Runs that are not wrong beside wrong
-    ones have a slope near one.
+    Two units, with slopes that differ beyond their uncertainty, are no unit but a missing effect.
+    Runs that are not wrong beside wrong ones have a slope near one.
     """
     wrong = sorted((s for s in slopes if _is_wrong(s)), key=lambda slope: abs(slope.value))
     units = {known for slope in wrong if (known := named_factor(slope))}
@@ -306,7 +297,7 @@ def _jackknife_std(without: Array) -> float:
 def _passivity(runs: Sequence[Run], profile: WinchProfile) -> Iterator[Finding]:
     """A torque whose dissipative part does negative work, where no load is known.
 
-    The runs have one friction: of runs in one direction each it is an offset that follows the
+    The friction is one of all runs: of runs in one direction each it is an offset that follows the
     direction, and of the wrong sign where the angle's is inverted.
     """
     free = [run for run in runs if "motor_torque" in run and _has_no_load(run, profile)]

@@ -57,16 +57,12 @@ def highest_frequency(
 ) -> float:
     """Frequency above which no more than a share of a signal's power beyond its white noise is, Hz.
 
-    ``values`` (n,): NaN where it is missing. ``rate``: samples per second. ``lost``: that share; 1
-    % by default, 0 for the highest frequency that exceeds the noise.
-
-    Notes
-    -----
-    The noise is that of the upper half of the frequencies, from the median of Welch's spectrum. A
-    frequency counts where its power exceeds the noise by an F test at 1 % for all frequencies and
-    signals together (Bonferroni). A block has two degrees of freedom: under this window, blocks
-    that overlap by half are nearly independent (ρ² = 0.002). Neighbouring frequencies are not, and
-    a median has 2/π of the efficiency of a mean: of the noise 1/π of the degrees of freedom count.
+    The share is 1 % by default, and 0 for the highest frequency that exceeds the noise. The noise
+    is that of the upper half of the frequencies, from the median of Welch's spectrum. A frequency
+    counts where its power exceeds the noise by an F test at 1 % for all frequencies and signals
+    together (Bonferroni). A block has two degrees of freedom: under this window, blocks that
+    overlap by half are nearly independent (ρ² = 0.002). Neighbouring frequencies are not, and a
+    median has 2/π of the efficiency of a mean: of the noise 1/π of the degrees of freedom count.
 
     References
     ----------
@@ -128,12 +124,7 @@ class Band:
 
     @cached_property
     def gain(self) -> Array:
-        """Gain of a Butterworth filter run forward and backward, (kept,).
-
-        Notes
-        -----
-        1 / (1 + (f/fc)^2N) with N = 4: the squared magnitude of one pass.
-        """
+        """Gain of a Butterworth filter run forward and backward: 1 / (1 + (f/fc)^2N) with N = 4."""
         frequency = self.frequency
         if self.cut_off is None:
             return np.ones_like(frequency)
@@ -141,10 +132,7 @@ class Band:
 
 
 def to_frequency(signal: Array, band: Band) -> Array:
-    """Coefficients of a signal within its band.
-
-    ``signal`` (n,) or (many, n). ``band``: of n samples. Returns: (kept,) or (many, kept).
-    """
+    """Coefficients of a signal, (n,) or (many, n), within its band, (kept,) or (many, kept)."""
     full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
     gain = band.gain
     return full[..., : len(gain)] * gain
@@ -153,10 +141,9 @@ def to_frequency(signal: Array, band: Band) -> Array:
 def fast_count(count: int) -> int:
     """Largest number of samples, at most ``count``, whose transform is fast.
 
-    A transform of n samples takes a time in proportion to the prime factors of n: one of 8998 =
-    2·11·409 samples takes ten times as long as one of 8993 = 17·23². At most 1.3 % of a run is left
-    out at its end, the largest gap between such numbers above 1000 (1105 to 1120); shorter runs are
-    kept whole.
+    A transform of n samples takes a time in proportion to the prime factors of n: 8998 = 2·11·409
+    samples take ten times as long as 8993 = 17·23². At most 1.3 % of a run is left out, the largest
+    gap between such numbers above 1000; shorter runs are kept whole.
     """
     if count < _LEAST_CUT:
         return count
@@ -183,20 +170,13 @@ def to_time(coefficients: Array, band: Band) -> Array:
 
 
 def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
-    """Zero-phase 4th-order Butterworth low-pass.
-
-    ``signal`` (n,). ``rate``: samples per second. ``cut_off``: frequency at which half of the
-    amplitude is left, Hz. Returns: (n,).
-    """
+    """Zero-phase 4th-order Butterworth low-pass; ``cut_off``, Hz, leaves half of the amplitude."""
     band = Band(len(signal), rate, cut_off, kept_cut_offs=np.inf)
     return to_time(to_frequency(signal, band), band)
 
 
 def narrow_edges(frequency: Array) -> Array:
-    """Edges of 24 logarithmic bands, merged where one holds no coefficient.
-
-    ``frequency`` (n,): of the coefficients, sorted, Hz. Returns: (bands + 1,).
-    """
+    """Edges of 24 logarithmic bands of sorted frequencies, merged where one holds none."""
     positive = frequency[frequency > 0]
     if len(positive) < 2:
         return np.array([-np.inf, np.inf])
@@ -209,15 +189,10 @@ def narrow_edges(frequency: Array) -> Array:
 def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
     """Smooth the logarithm of a spectrum over its bands; with the degrees of freedom of the result.
 
-    ``power`` (bands,): mean square per band. ``dof`` (bands,). ``order``: of the differences that
-    are penalised: the spectrum continues as a line beyond bands with many degrees of freedom (2),
-    or as a constant (1). Returns (bands,): smoothed power, and 2 / Var(ln power).
-
-    Notes
-    -----
-    Penalised Whittle likelihood: ν power / σ² is χ²(ν), ln σ² has differences of the given order
-    with zero mean and standard deviation 0.25. Maximised by Fisher scoring with working weights
-    ν/2. A band of many coefficients keeps its own value.
+    Penalised Whittle likelihood: ν power / σ² is χ²(ν), and ln σ² has differences of the given
+    order with zero mean and standard deviation 0.25. Beyond bands with many degrees of freedom the
+    spectrum continues as a line (order 2) or a constant (1). It is maximised by Fisher scoring with
+    working weights ν/2; the degrees of freedom are 2 / Var(ln power).
 
     References
     ----------
@@ -241,10 +216,7 @@ def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
 
 
 def band_edges(frequency: Array, copies: int) -> Array:
-    """Edges of about 14 logarithmic bands that each hold at least eight coefficients.
-
-    ``frequency`` (n,): of the coefficients, sorted, Hz. Returns: (bands + 1,).
-    """
+    """Edges of about 14 logarithmic bands that each hold at least eight sorted frequencies."""
     positive = frequency[frequency > 0]
     if len(positive) < 2 * _LEAST_COEFFICIENTS:
         return np.array([-np.inf, np.inf])

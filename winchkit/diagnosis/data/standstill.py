@@ -47,12 +47,8 @@ torque is no noise: an AR(1) noise with a coefficient of 0.6 has 2.5."""
 def standstills(motion: Motion) -> list[slice]:
     """Standstills of the motor: the angle stays within its noise for longer than it does at a turn.
 
-    Returns: of five samples at least.
-
-    Notes
-    -----
-    A motion that turns with the acceleration a stays within a width w for 2 √(2 w/a); a is its rms
-    over the run.
+    A turn with the rms acceleration a of the run stays within a width w for 2 √(2 w/a). A
+    standstill has five samples at least.
     """
     time, acceleration = motion.at.time, float(np.sqrt(np.mean(motion.at.motor_acceleration**2)))
     intervals, width = _within_noise(motion.at.motor_angle)
@@ -83,10 +79,7 @@ def _within_noise(angle: Array) -> tuple[list[slice], float]:
 
 
 def spread_at_standstill(residual: Array, intervals: Sequence[slice]) -> tuple[float, float]:
-    """Variance within intervals, pooled, and half their mean square successive difference.
-
-    ``residual`` (n,). ``intervals``: each of two samples at least.
-    """
+    """Variance within intervals, pooled, and half their mean square successive difference."""
     parts = [residual[interval] for interval in intervals]
     dof = max(1, sum(len(part) - 1 for part in parts))
     within = sum(float(np.sum((part - np.mean(part)) ** 2)) for part in parts)
@@ -97,9 +90,8 @@ def spread_at_standstill(residual: Array, intervals: Sequence[slice]) -> tuple[f
 def standstill_mask(measured: Array, nominal: Array, motion: Motion) -> NDArray[np.bool_]:
     """Samples at standstills whose torque is a reaction of static friction.
 
-    ``measured``, ``nominal`` (n,): motor torque and its prediction, N m. Returns (n,) of bool: all
-    false where the residual is as steady at standstills as its noise, or where hardly anything else
-    is there.
+    There are none where the residual is as steady at standstills as its noise, or where hardly
+    anything else is there.
     """
     mask = np.zeros(len(measured), dtype=bool)
     for interval in _reactions(measured - nominal, motion)[0]:
@@ -120,7 +112,7 @@ def _reactions(residual: Array, motion: Motion) -> tuple[list[slice], float]:
 def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> list[Finding]:
     """Findings on runs whose torque is not compared at standstills.
 
-    ``runs``: name, measured and predicted torque (n,) and nominal motion of each.
+    ``runs`` holds the name, measured and predicted torque and nominal motion of each.
     """
     found = []
     for name, measured, nominal, motion in runs:

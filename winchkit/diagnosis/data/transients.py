@@ -1,9 +1,8 @@
 """Masks of samples at which the force of a hanging weight is not known.
 
-Where the weight meets the next layer of a spiral drum, the winding radius jumps, and with it the
-speed of the cable. How large the force of that transient is depends on compliances that the
-nominal model does not have, and its accelerations are finite differences across the jump. Of
-unevenly sampled runs the acceleration is uncertain beside gaps.
+At the next layer of a spiral drum the winding radius and the speed of the cable jump. The force of
+that transient depends on compliances that the nominal model does not have. Of unevenly sampled runs
+the acceleration is uncertain beside gaps.
 """
 
 from __future__ import annotations
@@ -28,10 +27,9 @@ _NORMAL = 1.4826
 
 
 def transient_mask(measured: Array, output: str, motion: Motion) -> Mask:
-    """Samples of an output near a change of layer whose transient exceeds the noise.
+    """Samples of tension or torque near a change of layer whose transient exceeds the noise.
 
-    ``measured`` (n,): N or N m. ``output``: ``tension`` or ``motor_torque``. Returns (n,) of bool:
-    all false without a known weight or without layers. A step that the encoder's noise crosses
+    There are none without a known weight or without layers. A step that the encoder's noise crosses
     while the cable rests does not count.
     """
     drum = drum_of(motion.at.profile)
@@ -52,11 +50,8 @@ def transient_mask(measured: Array, output: str, motion: Motion) -> Mask:
 
 
 def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mask:
-    """Samples of a force whose acceleration is less certain than elsewhere and than the instrument.
-
-    ``measured``, ``nominal`` (n,). Returns (n,) of bool: all false where no force follows from the
-    acceleration of unevenly sampled angles.
-    """
+    """Samples of a force whose acceleration is less certain than elsewhere and than the instrument;
+    none unless it follows from the acceleration of unevenly sampled angles."""
     load, std = motion.load, motion.load_std
     if load is None or std is None or not std.any():
         return np.zeros(len(measured), dtype=bool)
@@ -72,9 +67,6 @@ def with_neighbours(marked: Mask, clock: SamplingTimes) -> Mask:
 
 
 def white_noise(measured: Array) -> float:
-    """Standard deviation of white noise, from second differences by their median absolute value.
-
-    ``measured`` (n,).
-    """
+    """Standard deviation of white noise, from second differences by their median absolute value."""
     second_differences = np.diff(measured, 2)
     return float(_NORMAL * np.median(np.abs(second_differences)) / np.sqrt(6))

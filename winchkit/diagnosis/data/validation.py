@@ -1,7 +1,4 @@
-"""Input validation: whether runs can be compared with a profile.
-
-Every fault is reported with its file and column.
-"""
+"""Input validation: whether runs can be compared with a profile, by file and column of a fault."""
 
 from __future__ import annotations
 
@@ -37,11 +34,10 @@ below it most of the measured variance is not the motion."""
 
 
 def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
-    """Validate runs against a profile.
+    """Validate runs against a profile: notes on what is missing without being a fault.
 
-    Returns: notes on what is missing without being a fault. Raises RunError with every fault of
-    every run: missing columns, constant or mostly missing channels, the same run twice, a run of
-    another winch.
+    A RunError has every fault of every run: missing columns, constant or mostly missing channels,
+    the same run twice, a run of another winch.
     """
     if not runs:
         raise RunError("no run given")
@@ -72,8 +68,8 @@ def _alike(faults: Sequence[Fault]) -> list[Fault]:
 def without_constants(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
     """Leave a constant channel out of a run in motion where it varies in another run.
 
-    There the instrument measures, but its resolution is coarser than what happens in this run.
-    A channel that is constant in all runs stays, for :func:`validate_runs` to refuse.
+    The instrument's resolution is then coarser than what happens in this run. A channel that is
+    constant in all runs stays, for :func:`validate_runs` to refuse.
     """
     varies = {
         name for run in runs for name in OUTPUTS if name in run and not any(constant(run, name))

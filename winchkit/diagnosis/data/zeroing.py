@@ -1,11 +1,10 @@
 """Instruments that were zeroed anew before each run: an offset that differs between repeats.
 
-Repeats have equal predictions, so that their difference is noise, and a constant where the
-instrument was zeroed in between. The mean of every difference is tested against its variation over
-blocks of time (batch means, one F test per output), and against a random walk of the instrument
-beside white noise (local level model), so that a slow drift is none. Repeats at different
-temperatures may differ by thermal effects: a straight line over the temperature, and over its
-product with the output, is fitted beside.
+The difference of repeats is noise, and a constant where the instrument was zeroed in between. Its
+mean is tested against its variation over blocks of time (batch means, one F test per output), and
+against a random walk beside white noise (local level model), so that a slow drift is none. At
+different temperatures a straight line over the temperature, and over its product with the output,
+is fitted beside.
 
 References
 ----------
@@ -49,10 +48,9 @@ def zeroed_anew(
 ) -> Finding | None:
     """Finding ``zeroed-anew``; value: standard deviation of the offset between repeats, SI.
 
-    ``differences``: contrasts of the residuals of repeats, each with the variance of one run's
-    noise; NaN where a sample is not compared. ``thermal``: per difference its known regressors,
-    (k, n), such as the difference of temperatures; None for none. Returns: None where the means of
-    the differences, beside the regressors, are within their variation over eight blocks of time.
+    ``differences`` are contrasts of the residuals of repeats with the variance of one run's noise,
+    NaN where not compared; ``thermal`` holds their known regressors, (k, n) each, such as the
+    difference of temperatures.
     """
     means, known = [], []
     for index, difference in enumerate(differences):
@@ -132,8 +130,7 @@ def as_noise(finding: Finding) -> Finding:
 def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
     """Finding ``zeroed-anew`` of the cable length, where an integral of a velocity is the angle.
 
-    The angle is 0 at the start of such a run, wherever the cable was: an offset of the length
-    belongs to each run.
+    The angle is 0 at the start of such a run, wherever the cable was: each run has its own offset.
     """
     own = [run for run in runs if run.is_angle_integrated and "cable_length" in run]
     if not own or len(runs) < 2:
@@ -148,15 +145,11 @@ def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
 def is_random_walk(means: Array) -> bool:
     """Whether a random walk from zero, beside white noise, explains the level of block means.
 
-    ``means``: block means of differences between repeats, or of runs about a common offset, (n, 8).
-
-    Notes
-    -----
-    Local level model: block means have one level each, and the covariance w (I + r M) with the M of
-    means of a random walk that starts at zero. The level is that of generalised least squares, its
-    p-value (F with n and 7 n degrees of freedom) the largest over the ratios r that the restricted
-    likelihood does not reject at 5 %: from r = 0, white noise, of which all blocks determine the
-    level, to a walk alone, of which only the first does.
+    Local level model of the means, (n, 8), with the covariance w (I + r M), M being that of the
+    means of a random walk from zero. The level is that of generalised least squares, its p-value (F
+    with n and 7 n degrees of freedom) the largest over the ratios r that the restricted likelihood
+    does not reject at 5 %: from r = 0, where all blocks determine the level, to a walk alone, where
+    only the first does.
     """
     count = len(means)
     block = np.arange(1.0, BLOCKS + 1)

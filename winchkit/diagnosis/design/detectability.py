@@ -25,10 +25,9 @@ class DetectionThreshold:
     """1 % level of the largest score under noise alone."""
 
     def required_ss(self, n_parameters: int, by_chance: float = np.inf) -> float:
-        """Decrease of χ² that an effect with this number of parameters must reach.
+        """Decrease of χ² that an effect must reach.
 
-        ``by_chance`` is the threshold of this effect alone, see
-        :class:`~winchkit.diagnosis.selection.scores.Score`; the lower one counts.
+        ``by_chance`` is the threshold of this effect alone; the lower threshold counts.
         """
         threshold = min(self.score_threshold, by_chance)
         return max(threshold, 0.0) + self.penalty_per_parameter * n_parameters
@@ -41,13 +40,9 @@ class DetectionThreshold:
 def detectable(scores: tuple[Score, ...], threshold: DetectionThreshold) -> tuple[Detectable, ...]:
     """Smallest size of the main parameter of every effect that is detected with 90 % power.
 
-    Returns: NaN where no size within the parameter's bounds is detected.
-
-    Notes
-    -----
-    √λ = √required + Φ⁻¹(0.9), where λ is the noncentrality of the projected signature: the normal
-    approximation of a noncentral χ² with one degree of freedom, also for effects with more
-    parameters, for which it is conservative.
+    The size is NaN where none within the bounds is detected. √λ = √required + Φ⁻¹(0.9) with the
+    noncentrality λ of the projected signature: the normal approximation of a noncentral χ² with one
+    degree of freedom, conservative for effects with more parameters.
     """
     out = []
     for item in scores:

@@ -50,10 +50,10 @@ class Information:
 def next_runs(
     regression: TimeSeriesRegression, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
 ) -> tuple[NextRun, ...]:
-    """Programmes that separate each pair best per minute, with their power.
+    """At most two programmes per pair that separate it best per minute, with their power.
 
-    ``noise``: rms per output, SI. Returns: at most two per pair; where no programme helps, what the
-    card of the effect says, with NaN power.
+    ``noise`` is the rms per output, SI. Where no programme helps, the text is that of the effect's
+    card, with NaN power.
     """
     if not pairs:
         return ()
@@ -85,11 +85,7 @@ def _is_of_an_input(regression: TimeSeriesRegression, first: Term, second: Term)
 
 
 def power_of(noncentrality: float, required: float = SEPARATED_AT) -> float:
-    """Power of a χ² test with one degree of freedom.
-
-    ``noncentrality``: noncentrality λ. ``required``: χ² that is required. Returns: P(χ²'(1, λ) >
-    required).
-    """
+    """Power P(χ²'(1, λ) > required) of a χ² test with one degree of freedom."""
     return float(1 - chndtr(required, 1, max(noncentrality, 0.0)))
 
 
@@ -102,11 +98,10 @@ def separation(
     known: Information | None = None,
     repeats: int = 1,
 ) -> float:
-    """Noncentrality λ of the first effect where the second may have any size.
+    """Noncentrality λ of the first effect where the second, if there is one, may have any size.
 
-    ``first``, ``second``: effects; without a second one the first beside nuisance parameters alone.
-    ``noise``: rms per output, SI. ``known``: information of the runs so far; then the increase of λ
-    by the programme: the second effect has one size there and here.
+    ``noise`` is the rms per output, SI. With ``known``, the information of the runs so far, the
+    result is the increase of λ by the programme: the second effect has one size there and here.
     """
     rows = _rows(regression, first, second, noise)
     if rows is None:
@@ -137,10 +132,8 @@ def information_of(
 def _rows(
     regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
 ) -> tuple[Array, Array, Array] | None:
-    """Columns of a run's own states, columns shared by all runs, and the first effect, whitened.
-
-    None where a prediction is not finite.
-    """
+    """Whitened columns of a run's own states, of all runs and of the first effect; None where a
+    prediction is not finite."""
     weight = np.empty(regression.n_rows)
     for segment in regression.segments:
         weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)

@@ -51,8 +51,8 @@ class Offer:
     def worth(self) -> tuple[float, ...]:
         """Sort key, larger is better.
 
-        Pairs separated with at least 90 % power, then the sum of powers, then per minute; where
-        nothing is to be separated, effects that become detectable per minute.
+        Pairs separated with at least 90 % power come first, then the sum of powers, then that per
+        minute; where nothing is to be separated, effects that become detectable per minute.
         """
         separated = sum(power >= _HIGH_POWER for power in self.powers)
         summed = round(sum(power for power in self.powers if power >= LEAST_POWER), 1)
@@ -87,10 +87,9 @@ def offers(
     repeats: int = 2,
     operating_range: OperatingRange | None = None,
 ) -> list[Offer]:
-    """Candidate programmes within an operating range, best first.
+    """Candidate programmes within an operating range, by default that of the runs, best first.
 
-    ``noise``: rms per output, SI. ``repeats``: runs of each. ``operating_range``: None for that of
-    the runs so far.
+    ``noise`` is the rms per output, SI.
     """
     dataset = regression.dataset
     operating_range = operating_range or range_of_runs(dataset)
@@ -149,10 +148,7 @@ def programme_of(
     operating_range: OperatingRange | None = None,
     repeats: int = 2,
 ) -> Programme:
-    """Motion programme of a kind for ``winchkit run``.
-
-    ``operating_range``: None for that of the runs so far.
-    """
+    """Motion programme of a kind for ``winchkit run``, by default in the range of the runs."""
     operating_range = operating_range or range_of_runs(dataset)
     steps: list[ProgrammeStep] = []
     if kind.temperature_rise:

@@ -1,9 +1,10 @@
 """The regression problem: the interface that fit, noise, cross-validation and selection use.
 
 A regression has rows (observations), each with a noise band, and predicts them from a hypothesis:
-effects with values, nuisance parameters and initial states. What the rows are - spectral
-coefficients of a winch's runs or equations of a robot's poses - is known to its implementations
-only: :class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression` and that of robots.
+effects with values, nuisance parameters and initial states. Only its implementations know what the
+rows are: spectral coefficients of a winch's runs
+(:class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression`) or equations of a robot's
+poses.
 """
 
 from __future__ import annotations
@@ -49,41 +50,24 @@ class Folds:
 class Regression(ABC):
     """A nonlinear regression problem with effects, nuisance parameters and initial states.
 
-    ``n_runs``: number of runs, each of which has an initial state per effect with memory.
-
-    Attributes
-    ----------
-    dataset : Dataset
-        The data.
-    n_rows : int
-        Number of rows.
-    nominal_residual : ndarray of shape (n_rows,)
-        Measured minus predicted by the profile without effects.
-    nuisance_columns : ndarray of shape (n_rows, n_nuisances)
-        Regressor columns of the nuisance parameters, which are linear.
-    fits_offset : bool
-        Whether the first nuisance parameter after the offsets of single runs is the offset of the
-        length instrument, one of all runs.
-    n_run_offsets : int
-        Number of the first nuisance parameters that are offsets of single runs, of instruments that
-        were zeroed anew before each run. As initial states, they keep their run's values whatever
-        is held out.
-    fits_discretization : bool
-        Whether the last nuisance parameter is a correction of the discretisation error, which
-        acts through the effects too.
-
-    Notes
-    -----
     The vector of unknowns holds the nuisance parameters, the coordinates of every effect
-    (:class:`~winchkit.effects.parametrization.Coordinates`), then the initial states.
+    (:class:`~winchkit.effects.parametrization.Coordinates`), then the initial states, one per run
+    and effect with memory.
     """
 
     dataset: Dataset
     nominal_residual: Array
+    """Measured minus predicted by the profile without effects, (n_rows,)."""
     nuisance_columns: Array
+    """Regressors of the nuisance parameters, which are linear, (n_rows, n_nuisances)."""
     fits_offset: bool = False
+    """Whether the first nuisance parameter after the offsets of single runs is the offset of the
+    length instrument, one of all runs."""
     n_run_offsets: int = 0
+    """Number of the first nuisance parameters that are offsets of single runs, of instruments that
+    were zeroed anew; as initial states they keep their run's values whatever is held out."""
     fits_discretization: bool = False
+    """Whether the last nuisance parameter corrects the discretisation error, also of effects."""
 
     def __init__(self, segments: Sequence[Segment], n_runs: int) -> None:
         self.segments = tuple(segments)
@@ -119,10 +103,8 @@ class Regression(ABC):
 
     @property
     def share_of_row(self) -> Array:
-        """Share of the samples behind a row that are compared, shape (n_rows,).
-
-        A row of a run of which a half is compared has half the variance and counts half.
-        """
+        """Share of the samples behind a row that are compared, (n_rows,): a row of a run of which a
+        half is compared has half the variance and counts half."""
         return np.ones(self.n_rows)
 
     def compared_rows(self, output: str) -> float:
@@ -160,10 +142,7 @@ class Regression(ABC):
 
     @abstractmethod
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
-        """Change of the prediction by the effects of a hypothesis.
-
-        Returns: (n_rows,).
-        """
+        """Change of the prediction by the effects of a hypothesis, (n_rows,)."""
 
     @abstractmethod
     def outputs_of(self, stage: Stage) -> set[str]:
@@ -280,13 +259,11 @@ class Regression(ABC):
         return np.concatenate(low), np.concatenate(high)
 
     def jacobian(self, vector: Array, like: Hypothesis) -> Array:
-        """Derivative of the prediction with respect to the vector of unknowns.
+        """Derivative of the prediction with respect to the unknowns, (n_rows, n_unknowns).
 
         Forward differences with a step of 10⁻³ in the coordinates of the effects; backward at an
-        upper bound. The columns of initial states of one term are computed together, since each
-        run depends on its own state only.
-
-        Returns: (n_rows, n_unknowns).
+        upper bound. The columns of initial states of one term are computed together, since each run
+        depends on its own state only.
         """
         here = self.change(self.hypothesis(vector, like))
         _, high = self.bounds(like)

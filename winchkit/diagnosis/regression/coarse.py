@@ -1,10 +1,9 @@
 """Coarse regression: every k-th sample of one run of each set of repeats.
 
-A fit from several starting values is first made on the coarse regression, whose predictions cost a
-tenth, and then, from its best points, on all samples. Samples are taken without a low-pass: the
-model is evaluated at the same instants as the measurement, so that neither loses a frequency to
-which an effect belongs. The coarse fit only chooses starting values; its error, that of differences
-over longer steps included, is removed by the fit on all samples.
+A fit from several starting values is first made here, where predictions cost a tenth. Samples are
+taken without a low-pass: model and measurement have the same instants, so that neither loses a
+frequency to which an effect belongs. The fit on all samples from its best points removes the error
+of the differences over longer steps.
 """
 
 from __future__ import annotations
@@ -53,10 +52,7 @@ def coarse_regression(regression: TimeSeriesRegression) -> CoarseTimeSeries | No
 
 
 class CoarseTimeSeries(Coarse):
-    """Coarse regression of a winch's runs.
-
-    ``chosen``: run of ``whole`` behind every run of the coarse regression.
-    """
+    """Coarse regression of a winch's runs; ``chosen`` are the runs of ``whole`` behind its own."""
 
     regression: TimeSeriesRegression
 
@@ -79,10 +75,8 @@ class CoarseTimeSeries(Coarse):
         )
 
     def extended(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The hypothesis with the initial states of all runs, repeats alike.
-
-        The correction of the discretisation error belongs to the coarse step, and is left out.
-        """
+        """The hypothesis with the initial states of all runs, repeats alike, and without the
+        correction of the discretisation error, which belongs to the coarse step."""
         nuisances = hypothesis.nuisances
         if nuisances and self.regression.fits_discretization:
             nuisances = (*nuisances[:-1], 0.0)

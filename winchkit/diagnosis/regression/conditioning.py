@@ -27,21 +27,14 @@ _STEP = 1e-4
 
 @dataclass(frozen=True)
 class ValueCovariance:
-    """Covariance of the values of a linearised fit, SI.
-
-    Attributes
-    ----------
-    names : tuple of str
-        ``effect.parameter`` of every fitted value, after the nuisance parameters.
-    matrix : ndarray of shape (n_values, n_values)
-        Covariance; initial states are free and left out.
-    condition : float
-        Condition number of the whitened derivatives with columns of unit length.
-    """
+    """Covariance of the values of a linearised fit, SI."""
 
     names: tuple[str, ...]
+    """``effect.parameter`` of every fitted value, after the nuisance parameters."""
     matrix: Array
+    """Covariance, without the initial states, which are free, (n_values, n_values)."""
     condition: float
+    """Condition number of the whitened derivatives with columns of unit length."""
 
 
 COLLINEAR_DELAY = 10.0
@@ -67,11 +60,8 @@ def value_covariance(regression: Regression, fit: Fit, noise: BandNoise) -> Valu
 
 
 def collinearity(regression: Regression, fit: Fit, noise: BandNoise, index: int) -> float:
-    """Squared length of an effect's change over that of the part which the others cannot imitate.
-
-    Returns: variance inflation factor of the effect at its fitted values, 1 where it is orthogonal
-    to the others' derivatives.
-    """
+    """Squared length of an effect's change over that of the part which the others cannot imitate:
+    its variance inflation factor, 1 where it is orthogonal to the others' derivatives."""
     hypothesis = fit.hypothesis
     change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
     change *= noise.inverse_sigma(regression)

@@ -48,10 +48,8 @@ _RIDGE = 1e-12
 def extrapolation(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> float:
     """Largest variance of a fold's prediction from the other folds, relative to the noise variance.
 
-    Notes
-    -----
-    Computed per output in its unit: noise that is strongest at low frequencies makes an offset or a
-    drift, which the other folds must determine, less certain than the whitened rows show.
+    It is computed per output in its unit: noise that is strongest at low frequencies makes an
+    offset or a drift less certain than the whitened rows show.
     """
     shared = _shared(regression, fit)
     columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
@@ -75,12 +73,8 @@ def extrapolation(regression: Regression, fit: Fit, noise: BandNoise, folds: Fol
 
 
 def held_out(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> Array:
-    """Held-out χ² of every fold, its unknowns fitted to the other folds.
-
-    Initial states keep their own run's values, whatever is held out.
-
-    Returns: (n_folds,).
-    """
+    """Held-out χ² of every fold, (n_folds,), its unknowns fitted to the other folds; initial states
+    keep their own run's values, whatever is held out."""
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     columns = _in_time(regression, _shared(regression, fit) * inverse_sigma[:, None])
@@ -90,10 +84,7 @@ def held_out(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -
 
 
 def left_out_steps(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -> Array:
-    """Linearised change of the unknowns when each fold is left out.
-
-    Returns: (n_folds, n_unknowns).
-    """
+    """Linearised change of the unknowns when each fold is left out, (n_folds, n_unknowns)."""
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     columns = _in_time(regression, fit.jacobian * inverse_sigma[:, None])
@@ -129,10 +120,7 @@ def held_out_rms(
 
 
 def excess(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> float:
-    """Sum over the outputs of the mean square of an error beyond the noise, in units of the noise.
-
-    Outputs whose noise is unknown do not count.
-    """
+    """Sum over outputs of known noise of the mean square of an error beyond it, in its units."""
     return sum(
         max(0.0, (error / known) ** 2 - 1.0)
         for output, error in errors.items()
@@ -141,15 +129,10 @@ def excess(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> fl
 
 
 def signed_rank_p_value(before: Array, after: Array) -> float:
-    """One-sided p-value of the Wilcoxon signed-rank test that an error decreased.
+    """One-sided p-value of the Wilcoxon signed-rank test that the held-out χ² of folds decreased.
 
-    ``before``, ``after``: held-out χ² of every fold with the smaller and the larger model, shape
-    (n_folds,). Returns: one with fewer than eight folds or no change at all.
-
-    Notes
-    -----
-    Folds whose change is below 2 % of the largest take no part, unless fewer than eight would
-    remain: an effect may act in a few folds only.
+    It is one with fewer than eight folds or no change. Folds whose change is below 2 % of the
+    largest count only where fewer than eight would remain: an effect may act in a few folds only.
     """
     change = before - after
     size = np.abs(change)
@@ -163,8 +146,8 @@ def signed_rank_p_value(before: Array, after: Array) -> float:
 def _signed_rank_tail(differences: Array) -> float:
     """Probability of a signed-rank sum at least as large under symmetry about zero.
 
-    Exact for at most 50 differences of different sizes, else by the normal approximation with
-    its correction for ties. Zero differences take no part (Wilcoxon 1945).
+    It is exact for at most 50 differences of different sizes, else the normal approximation with
+    its correction for ties; zero differences take no part (Wilcoxon 1945).
     """
     different = differences[differences != 0.0]
     n = len(different)

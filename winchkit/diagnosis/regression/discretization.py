@@ -1,9 +1,8 @@
 """Discretisation error: change of the effects on a motion interpolated between the samples.
 
-Velocities, accelerations and hysteresis branches are computed from samples of the motor angle. On
-a four times finer time grid, interpolated by cubic splines, an effect changes the outputs by a
-slightly different amount. Which of the two is right depends on the motion between the samples, so
-the whole difference is taken as a possible error of fitted values and residuals.
+On a four times finer time grid, interpolated by cubic splines, the velocities, accelerations and
+hysteresis branches differ slightly from those of the samples. Which are right depends on the motion
+between the samples, so the whole difference is a possible error of fitted values and residuals.
 """
 
 from __future__ import annotations
@@ -37,10 +36,7 @@ filter must not overlap."""
 def discretization_error(
     dataset: Dataset, segments: Sequence[Segment], hypothesis: Hypothesis
 ) -> Array:
-    """Change of the effects' outputs on a finer time grid minus that on the samples.
-
-    Returns: (n_rows,).
-    """
+    """Change of the effects' outputs on a finer time grid minus that on the samples, (n_rows,)."""
     out = np.zeros(segments[-1].rows.stop)
     if not hypothesis.terms:
         return out
@@ -58,10 +54,7 @@ def discretization_error(
 
 
 def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
-    """Residual minus the share, between zero and one, that the discretisation error explains.
-
-    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). Returns: (n_rows,).
-    """
+    """Residual minus the share, from zero to one, that the discretisation error explains."""
     column = regression.discretization_error(fit.hypothesis)
     across = _beside(fit.jacobian * inverse_sigma[:, None], column * inverse_sigma)
     size = float(across @ across)
@@ -94,9 +87,8 @@ def _changes(line: Line, recording: Recording) -> dict[str, Array]:
 def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     """Denoised motion of a run, interpolated between its samples.
 
-    None where the derivatives are not differences of these samples: they were taken before a long
-    run was decimated, the drive's own velocity has less noise than the differences, or they are
-    those of a smoothing spline.
+    None where the derivatives are not differences of these samples, but precede a decimation, are
+    the drive's own velocity, which has less noise, or are those of a smoothing spline.
     """
     signals, smooth, clock = recording.signals, recording.smooth, recording.raw.clock
     if recording.decimated or clock.measured_rate is not None or clock.smoother is not None:
@@ -125,12 +117,8 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
 
 
 def interpolated(values: Array) -> Array:
-    """Cubic spline of evenly sampled values, with not-a-knot ends, at four times the rate.
+    """Cubic spline of even samples, 56 at least, with not-a-knot ends, at four times the rate.
 
-    ``values``: shape (n,), with n of at least 56.
-
-    Notes
-    -----
     The second derivatives M of a spline through values y at unit spacing satisfy M[i−1] + 4 M[i] +
     M[i+1] = 6 δ²y[i]; the inverse of this recurrence is the filter z^|k|/√12 with z = √3 − 2
     (Unser, Aldroubi & Eden 1993), whose value after 28 samples is 10⁻¹⁶. At a not-a-knot end M is
@@ -159,10 +147,10 @@ def interpolated(values: Array) -> Array:
 
 
 def _force_correction(recording: Recording, line: Line) -> Array:
-    """Force lost by second differences over the span h, shape (n,).
+    """Force lost by second differences over the span h, (n,): that of x is x″ + h²/12 · x⁗.
 
-    A second difference of x is x″ + h²/12 · x⁗. Only the part of the force that is proportional to
-    the acceleration of the cable, as of a hanging weight, is corrected.
+    Only the part proportional to the acceleration of the cable is corrected, as of a hanging
+    weight.
     """
     signals, tension = recording.signals, recording.smooth.at.tension
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))

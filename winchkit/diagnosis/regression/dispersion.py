@@ -1,8 +1,7 @@
 """Overdispersion: differences of χ² where a model leaves more than the noise.
 
-A difference of χ² between two models is judged against the variance of the residual. Where the
-better model leaves more than the noise, that part is unexplained and may belong to either: the
-variance of a band is then the mean square of the residual (quasi-likelihood).
+The residual of the better of two models beyond the noise is unexplained and may belong to either:
+the variance of a band is then the mean square of the residual (quasi-likelihood).
 
 References
 ----------
@@ -32,21 +31,14 @@ _WORSE = 1 / 740
 
 
 def overdispersed(regression: Regression, fit: Fit, noise: BandNoise) -> BandNoise:
-    """Variance of every band where a residual may exceed the noise.
+    """Variance of every band where a residual may exceed the noise, whose ``rms`` remains.
 
-    ``fit``: model whose residual counts as unexplained. Returns: variances and their degrees of
-    freedom; ``rms`` remains that of the noise.
-
-    Notes
-    -----
     The mean square of band b is S_b/ν_b, with ν_b the rows less the leverage of the fitted
-    unknowns. Its degrees of freedom are the smaller of ν_b and 3 (Σr²)²/Σr⁴, which is ν_b for
-    normal residuals of equal variance and less where few coefficients have most of the power, as of
-    a residual that is correlated in time beyond the width of the band.
-
-    Where an F test at 5 % rejects that residual and noise have one variance, the larger of the two
-    is taken, else the one with more degrees of freedom: without repeats that of the residual, since
-    the noise is what all candidates together leave.
+    unknowns. Its degrees of freedom are the smaller of ν_b and 3 (Σr²)²/Σr⁴, which is less where
+    few coefficients have most of the power, as of a residual that is correlated in time beyond the
+    width of the band. Where an F test at 5 % rejects that residual and noise have one variance, the
+    larger of the two is taken, else the one with more degrees of freedom: without repeats that of
+    the residual, since the noise is what all candidates together leave.
     """
     own, dof = _of_residual(regression, fit, noise)
     ratio = own / noise.power
@@ -64,8 +56,6 @@ def overdispersed(regression: Regression, fit: Fit, noise: BandNoise) -> BandNoi
 def excess_p_value(regression: Regression, fit: Fit, noise: BandNoise) -> float:
     """P-value of a residual that does not exceed the noise (Fisher's combination over bands).
 
-    Notes
-    -----
     F test of the residual's mean square against the noise in every band; -2 Σ ln p is χ² with two
     degrees of freedom per band. Noise of the saturated model shares its residual with the fit, so
     that the test is conservative without repeats.
@@ -99,15 +89,11 @@ def _of_residual(regression: Regression, fit: Fit, noise: BandNoise) -> tuple[Ar
 def fits_worse(regression: Regression, rival: Fit, best: Fit, noise: BandNoise) -> bool:
     """Whether a rival fits worse than another model by more than a true effect may.
 
-    ``rival``, ``best``: fits under the same variances. ``noise``: these variances, with their
-    degrees of freedom ν_b.
-
-    Notes
-    -----
     The limit of Δχ² is the square of the quantile of t at 1 - 1/740: 9 for known variances, where a
     true effect loses that much by three standard deviations of the direction in which the two
-    differ. With the difference Δ_b of band b the degrees of freedom are (Σ|Δ_b|)²/Σ(Δ_b²/ν_b)
-    (Satterthwaite): those of the band where one band has all of the difference.
+    differ. With the difference Δ_b of band b and ν_b of its variance, the degrees of freedom are
+    (Σ|Δ_b|)²/Σ(Δ_b²/ν_b) (Satterthwaite): those of the band where one band has all of the
+    difference.
     """
     difference = rival.chi_square - best.chi_square
     if difference <= largest_loss(np.inf):

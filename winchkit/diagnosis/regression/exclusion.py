@@ -1,9 +1,8 @@
 """Exclusion of samples near backlash impacts, which the fitted model does not predict.
 
-Where gear teeth meet again after backlash, the drum changes its speed within less than a sampling
-interval. The force then depends on the compliance of the drive train, which is not modelled, and
-on the time between two samples. If these samples are fitted, their residuals are explained by
-spurious ripple and friction.
+Where gear teeth meet again, the force depends on the compliance of the drive train, which is not
+modelled, and on the time between two samples. A fit of these samples would explain them by spurious
+ripple and friction.
 """
 
 from __future__ import annotations
@@ -24,10 +23,8 @@ _MOST = 0.25
 
 
 def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:
-    """Data set without force and torque near impacts of the fitted effects.
-
-    Returns: None where no sample is affected, or more than a quarter of all are.
-    """
+    """Data set without force and torque near impacts of the fitted effects; None where no sample is
+    affected, or more than a quarter of all are."""
     recordings = tuple(
         _without_impacts(recording, started(hypothesis, run))
         for run, recording in enumerate(dataset.recordings)

@@ -16,10 +16,8 @@ error of 1/√(2(n − 1)), 10 %."""
 def time_blocks(
     segments: Sequence[Segment], samples: Sequence[int], wanted: int = _BLOCKS
 ) -> Folds:
-    """Contiguous blocks of time of equal length within a run, the same for all its outputs.
-
-    ``wanted``: number of blocks of all runs together; every run has at least two.
-    """
+    """Contiguous blocks of time of equal length within a run, at least two per run and about
+    ``wanted`` of all runs, the same for all outputs."""
     total = sum(samples)
     first, starts, counts = 0, [], []
     for count in samples:

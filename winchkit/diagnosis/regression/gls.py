@@ -1,10 +1,10 @@
 """Generalised least squares in a trust region (Levenberg-Marquardt), with bounds, several starts.
 
-The fit minimises χ² = Σ (rᵢ/σᵢ)², the sum of squared whitened residuals. The damping of a step
-follows from the radius within which the linear model is trusted (Moré). The normal equations are
-solved in scaled form, directions that the data do not determine are left out (truncated
-eigenvalues), and the iteration stops where it would reduce χ² by less than 0.02. With 10⁵ rows and
-a handful of unknowns this is about ten times faster than a general solver.
+The fit minimises χ² = Σ (rᵢ/σᵢ)². The damping of a step follows from the radius within which the
+linear model is trusted (Moré). Directions that the data do not determine are left out (truncated
+eigenvalues of the scaled normal equations), and the iteration stops where it would reduce χ² by
+less than 0.02. With 10⁵ rows and a handful of unknowns this is about ten times faster than a
+general solver.
 
 References
 ----------
@@ -79,51 +79,28 @@ unknown."""
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fitted hypothesis.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-        Effects, nuisance parameters and initial states at their fitted values.
-    vector : ndarray of shape (n_unknowns,)
-        The same as a vector of unknowns.
-    residual : ndarray of shape (n_rows,)
-        Measured minus predicted, not whitened.
-    derivative : callable
-        Computes the Jacobian.
-    chi_square : float
-        Sum of squared whitened residuals.
-    n_unknowns : int
-        Number of unknowns.
-    abandoned : bool
-        Whether the fit was given up far from its target.
-    converged : bool
-        Whether the iteration ended since the next step promised, or the last one brought, no
-        decrease of χ² that counts.
-    iterations : int
-        Number of steps that were tried.
-    rank : int
-        Number of unknowns, less the directions that the data do not determine at the last
-        linearisation.
-    """
+    """A fitted hypothesis, with the vector of its unknowns, (n_unknowns,)."""
 
     hypothesis: Hypothesis
     vector: Array
     residual: Array
+    """Measured minus predicted, not whitened, (n_rows,)."""
     derivative: Callable[[], Array]
     chi_square: float
     n_unknowns: int
     abandoned: bool = False
+    """Whether the fit was given up far from its target."""
     converged: bool = False
+    """Whether the next step promised, or the last one brought, no decrease of χ² that counts."""
     iterations: int = 0
+    """Number of steps that were tried."""
     rank: int = 0
+    """Number of unknowns, less the directions that the last linearisation does not determine."""
 
     @cached_property
     def jacobian(self) -> Array:
-        """Derivative of the prediction, not whitened, (n_rows, n_unknowns).
-
-        Computed when first needed: of most rivals only χ² is compared.
-        """
+        """Derivative of the prediction, not whitened, (n_rows, n_unknowns), computed when first
+        needed: of most rivals only χ² is compared."""
         return self.derivative()
 
     @property
@@ -141,35 +118,15 @@ def fit(
     tolerance: float = 0.0,
     aim: float = np.inf,
 ) -> Fit:
-    """Fit all unknowns within their bounds.
+    """Fit all unknowns within their bounds, to the best point reached.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    start
-        Hypothesis at the starting values.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    most
-        Maximum number of iterations; by default 15, or 40 for an effect whose parameters act by
-        their product.
-    tolerance
-        Share of χ² beyond the number of rows whose decrease ends the iteration, where that is more
-        than 0.02: a model that misses by thousands is not fitted to the last hundredth.
-    aim
-        χ² that is of interest: the iteration ends where ten times the decrease that its next step
-        promises, or twice the latest one in every step that is left, and ten per unknown would not
-        reach it.
+    ``inverse_sigma`` is 1/σ of every row. ``most`` is 15 iterations by default, or 40 for an
+    effect whose parameters act by their product. ``tolerance`` is the share of χ² beyond the number
+    of rows whose decrease ends the iteration, where that is more than 0.02: a model that misses by
+    thousands is not fitted to the last hundredth. The iteration also ends where ten times the
+    decrease that its next step promises, or twice the latest one in every step that is left, and
+    ten per unknown would not reach the χ² ``aim``.
 
-    Returns
-    -------
-    Fit
-        The best point reached, and whether the fit has converged: not where the number of
-        iterations was the limit, no step decreased χ², or the aim is out of reach.
-
-    Notes
-    -----
     Trust region in the unknowns scaled by the lengths of their columns. A step that does not reduce
     χ² is shortened to the minimum of the parabola through both values and the slope.
     """
@@ -271,9 +228,6 @@ def starts_from_coarse_fits(
 
     None where one of the given starting values has a smaller χ² on all samples: the coarse
     regression is then no guide to which of them leads to the smallest.
-
-    ``starts``: hypotheses of the same effects at several starting values. ``inverse_sigma``: 1/σ of
-    every row, shape (n_rows,).
     """
     coarse = problem.coarse
     reduced = [coarse.reduced(start) for start in starts]
@@ -312,25 +266,11 @@ def fit_from(
 ) -> Fit:
     """Fit from several starting values and keep the smallest χ².
 
-    Of more than two starts only the two best after eight iterations are fitted to the end.
-
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    starts
-        Hypotheses of the same effects at several starting values.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    problem
-        Coarse regression, on which the best starting values are found; None for none.
-    target
-        The fit is abandoned at the optimum of the coarse regression, or at starting values that are
-        an optimum, if this χ² is out of reach, and on the way; None: never.
-    aim
-        χ² that decides on the fit, which ends where that is out of reach; None: the target's.
-    optimum
-        Whether the only starting values are an optimum that was found before.
+    ``problem`` is the coarse regression on which the best starting values are found. Of more than
+    two starts only the two best after eight iterations are fitted to the end. The fit is abandoned
+    at the optimum of the coarse regression, or at starting values that are an ``optimum`` found
+    before, and on the way, if the χ² ``target`` is out of reach; ``aim`` is the χ² that decides on
+    the fit, by default the target's.
     """
     found = list(starts) if optimum else None
     if problem is not None:

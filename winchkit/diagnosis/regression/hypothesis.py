@@ -14,21 +14,13 @@ START = "start"
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A model specification.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        Effects with their values.
-    nuisances : tuple of float
-        One per nuisance column of the regression; empty means zero.
-    starts : tuple of tuple of float
-        Per effect its initial state in every run; empty for an effect without memory.
-    """
+    """A model specification: effects with their values, nuisance parameters and initial states."""
 
     terms: tuple[Term, ...] = ()
     nuisances: tuple[float, ...] = ()
+    """One per nuisance column of the regression; empty means zero."""
     starts: tuple[tuple[float, ...], ...] = ()
+    """Per effect its initial state in every run; empty for an effect without memory."""
 
     def with_term(self, term: Term, runs: int) -> Hypothesis:
         """Hypothesis with one effect more, its initial states at zero."""

@@ -66,10 +66,8 @@ def profile_ends(
 ) -> tuple[Array, Array]:
     """Ends of profile-likelihood intervals of the unknowns of one term, or of all effects.
 
-    The other unknowns have the ends of the linearised fit. ``inverse_sigma``: 1/σ of every row,
-    shape (n_rows,). ``covariance``: covariance of the linearised fit, shape (n_unknowns,
-    n_unknowns). ``reach``: square root of the rise of χ² at the ends, shape (n_unknowns,). Returns:
-    (n_unknowns,).
+    The other unknowns have the ends of the linearised fit with the ``covariance``. ``reach`` is the
+    square root of the rise of χ² at the ends, (n_unknowns,).
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
@@ -142,26 +140,18 @@ class _Profile:
 
 @dataclass(frozen=True)
 class Spread:
-    """Uncertainty of every unknown of a fit, in the coordinates of the fit.
-
-    Attributes
-    ----------
-    std : ndarray of shape (n_unknowns,)
-        Standard deviation.
-    low, high : ndarray of shape (n_unknowns,)
-        Ends of the 95 % interval.
-    widening : ndarray of shape (n_unknowns,)
-        Standard deviation over that of the likelihood; infinite where the runs do not determine the
-        unknown.
-    covariance : ndarray of shape (n_unknowns, n_unknowns)
-        Covariance of the linearised fit by the likelihood alone.
-    """
+    """Uncertainty of every unknown of a fit, in the coordinates of the fit; (n_unknowns,) each."""
 
     std: Array
+    """Standard deviation."""
     low: Array
+    """Lower end of the 95 % interval."""
     high: Array
+    """Upper end of the 95 % interval."""
     widening: Array
+    """Standard deviation over that of the likelihood; infinite for an undetermined unknown."""
     covariance: Array
+    """Covariance of the linearised fit by the likelihood alone, (n_unknowns, n_unknowns)."""
 
 
 def whitened_jacobian(regression: Regression, fit: Fit, noise: BandNoise) -> Array:
@@ -172,10 +162,8 @@ def whitened_jacobian(regression: Regression, fit: Fit, noise: BandNoise) -> Arr
 def spread_of(
     regression: Regression, fit: Fit, noise: BandNoise, blocks: Folds, term: int | None = None
 ) -> Spread:
-    """Standard deviations and 95 % intervals of every unknown.
-
-    Intervals follow the profile of χ² for one term, or by default for all effects.
-    """
+    """Standard deviations and 95 % intervals of every unknown, which follow the profile of χ² for
+    one term, or by default for all effects."""
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = whitened_jacobian(regression, fit, noise)
     covariance_by_likelihood = inverse_normal(whitened)
@@ -225,42 +213,31 @@ def _jackknife(regression: Regression, fit: Fit, noise: BandNoise, blocks: Folds
 
 @dataclass(frozen=True)
 class BetweenParts:
-    """Variance of the common values by differences between parts of the data.
-
-    Attributes
-    ----------
-    variance : ndarray of shape (n_unknowns,)
-        Added variance; zero where parts agree within their uncertainties.
-    uncertain : ndarray of shape (n_unknowns,)
-        Part of the whole variance that was estimated from the parts.
-    dof : ndarray of shape (n_unknowns,)
-        Its degrees of freedom: parts less one where their weights are equal.
-    """
+    """Variance of the common values by differences between parts of the data, (n_unknowns,)."""
 
     variance: Array
+    """Added variance; zero where parts agree within their uncertainties."""
     uncertain: Array
+    """Part of the whole variance that was estimated from the parts."""
     dof: Array
+    """Degrees of freedom of that part: parts less one where their weights are equal."""
 
 
 def between_parts(shifts: Array, weights: Array, within: Array) -> BetweenParts:
     """Variance of common values by a random effect of every part.
 
-    ``shifts`` (n_parts, n_unknowns): shift w (θ̂ − θ̂ of the part) of each common value by each
-    part. ``weights`` (n_parts, n_unknowns): share w of each part in the information on each
-    unknown. ``within`` (n_unknowns,).
-
-    Notes
-    -----
-    The estimate of a part has the variance v/w + τ², v being ``within``. Cochran's Q = Σ u²/(w v)
-    of the shifts u gives τ² = v (Q − (G − 1))/(1 − Σw²), at least zero (DerSimonian and Laird). The
-    common value is the fit's, with the weights w, so that τ² Σw² is added to its variance; that of
-    the mean with the weights 1/(v/w + τ²) would not be larger. Where Q exceeds G − 1, intervals
-    have quantiles of t. Its degrees of freedom are those of Q at the estimated τ² (Satterthwaite),
-    G − 1 for equal weights (Hartung and Knapp) and fewer where few parts have most of the weight.
-    One part with most of it makes the divisor small: with fewer than three effective parts, 1/Σw²,
-    the variance is multiplied by Q/(G − 1) instead (Birge), which is the same for equal weights.
-    With two parts t(1) would make every third interval seven times as long although the parts
-    agree: there only the excess Q - 1 counts as uncertain.
+    ``shifts`` (n_parts, n_unknowns) are w (θ̂ − θ̂ of the part), ``weights`` the shares w of each
+    part in the information on each unknown. The estimate of a part has the variance v/w + τ², v
+    being ``within``. Cochran's Q = Σ u²/(w v) of the shifts u gives τ² = v (Q − (G − 1))/(1 − Σw²),
+    at least zero (DerSimonian and Laird). The common value is the fit's, with the weights w, so
+    that τ² Σw² is added to its variance; that of the mean with the weights 1/(v/w + τ²) would not
+    be larger. Where Q exceeds G − 1, intervals have quantiles of t. Its degrees of freedom are
+    those of Q at the estimated τ² (Satterthwaite), G − 1 for equal weights (Hartung and Knapp) and
+    fewer where few parts have most of the weight. One part with most of it makes the divisor small:
+    with fewer than three effective parts, 1/Σw², the variance is multiplied by Q/(G − 1) instead
+    (Birge), which is the same for equal weights. With two parts t(1) would make every third
+    interval seven times as long although the parts agree: there only the excess Q - 1 counts as
+    uncertain.
 
     References
     ----------

@@ -29,34 +29,21 @@ _DRAWS = 5000
 
 @dataclass(frozen=True)
 class LackOfFitTest:
-    """Result of a lack-of-fit test.
-
-    Attributes
-    ----------
-    p_value : float
-        Smallest p-value of a band times the number of bands (Bonferroni); NaN without repeats.
-    excess_power : ndarray of shape (n_bands,)
-        Residual sum of squares beyond its expectation, in units of the noise variance.
-    rejected : ndarray of bool, shape (n_bands,)
-        Bands whose corrected p-value is below 5 %.
-    """
+    """Result of a lack-of-fit test."""
 
     p_value: float
+    """Smallest p-value of a band times the number of bands (Bonferroni); NaN without repeats."""
     excess_power: Array
+    """Residual sum of squares beyond its expectation over the noise variance, (n_bands,)."""
     rejected: NDArray[np.bool_]
+    """Bands whose corrected p-value is below 5 %, (n_bands,)."""
 
 
 def lack_of_fit_test(
     regression: Regression, residual: Array, jacobian: Array, noise: BandNoise
 ) -> LackOfFitTest:
-    """F test of the mean of repeats against the pure error, in every band.
+    """F test of the mean of repeats against the pure error, in every band; NaN without repeats.
 
-    ``residual``: measured minus predicted, shape (n_rows,). ``jacobian``: derivative of the
-    prediction by the fitted unknowns, shape (n_rows, n_unknowns). Returns: with a NaN p-value where
-    the noise is not from repeats.
-
-    Notes
-    -----
     In band b the statistic is F = (S_b/ν_b)/σ̂_b², where S_b is the residual sum of squares of the
     means and ν_b the number of means less the leverage of the fitted unknowns. Its null
     distribution is F(ν_b, ν̂_b) with the degrees of freedom ν̂_b of the smoothed variance.
@@ -77,9 +64,9 @@ def output_p_values(
 ) -> dict[str, float]:
     """Probability of as large a misfit of each output by the noise alone, given its repeats.
 
-    The smaller one of two p-values, times two: that of the band with the largest F, and that of the
-    sum of squares over all bands, σ̂_b² ν_b F(ν_b, ν̂_b). Coloured noise has most of its power in
-    bands with few degrees of freedom: there the ratio of two rms values says little.
+    It is twice the smaller one of two p-values: that of the band with the largest F, and that of
+    the sum of squares over all bands, σ̂_b² ν_b F(ν_b, ν̂_b). Coloured noise has most of its power
+    in bands with few degrees of freedom: there the ratio of two rms values says little.
     """
     total, dof = _power_of_means(regression, residual, jacobian, noise)
     p, size = np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power)), noise.power * dof

@@ -1,9 +1,9 @@
 """Noise spectrum: variance of every frequency band, from repeats or from the saturated model.
 
-With repeats the variance is estimated from pure error: Helmert contrasts of the residuals of
-repeated runs contain noise only. The log power over the bands is then smoothed by a penalised
-Whittle likelihood. Without repeats the variance is that of the residual beside all candidate
-effects at once (saturated model), which counts an effect outside the catalogue as noise.
+With repeats the variance is estimated from pure error: Helmert contrasts of the residuals contain
+noise only. The log power over the bands is smoothed by a penalised Whittle likelihood. Without
+repeats the variance is that of the residual beside all candidate effects at once (saturated model),
+which counts an effect outside the catalogue as noise.
 
 References
 ----------
@@ -43,34 +43,24 @@ _ROWS_EACH = 4
 
 @dataclass(frozen=True)
 class BandNoise:
-    """Variance of the noise per band.
-
-    Attributes
-    ----------
-    power : ndarray of shape (n_bands,)
-        Variance of a spectral coefficient.
-    dof : ndarray of shape (n_bands,)
-        Degrees of freedom of each variance estimate.
-    rms : dict of str to float
-        Rms of the noise per output, in time, SI.
-    from_repeats : bool
-        Whether the variance is pure error; else it is that of the saturated model.
-    """
+    """Variance of the noise per band."""
 
     power: Array
+    """Variance of a spectral coefficient, (n_bands,)."""
     dof: Array
+    """Degrees of freedom of each variance estimate, (n_bands,)."""
     rms: dict[str, float]
+    """Rms of the noise per output, in time, SI."""
     from_repeats: bool
+    """Whether the variance is pure error; else it is that of the saturated model."""
 
     def inverse_sigma(self, regression: Regression) -> Array:
         """1/σ of every row, shape (n_rows,)."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
     def uncertainty(self, regression: Regression) -> dict[str, float]:
-        """Relative uncertainty (two standard deviations) of the mean square per output.
-
-        Coloured noise has few independent values: most of its power lies in the lowest bands.
-        """
+        """Relative uncertainty (two standard deviations) of the mean square per output; coloured
+        noise has few independent values, since most of its power lies in the lowest bands."""
         rows = sums_per_band(regression.share_of_row, regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
         out = {}
@@ -83,28 +73,15 @@ class BandNoise:
 
 @dataclass(frozen=True)
 class ReplicateContrasts:
-    """Differences and means of repeated runs, in frequency.
-
-    Attributes
-    ----------
-    difference : ndarray of shape (n_differences,)
-        Helmert contrasts of the repeats of every group and output.
-    difference_band : ndarray of int, shape (n_differences,)
-        Noise band of every contrast.
-    difference_share : ndarray of shape (n_differences,)
-        Share of the samples that are compared.
-    mean : ndarray of shape (n_means,)
-        Mean of the repeats, scaled to the variance of one run.
-    mean_band : ndarray of int, shape (n_means,)
-        Noise band of every mean.
-    mean_share : ndarray of shape (n_means,)
-        Share of the samples that are compared.
-    """
+    """Differences and means of repeated runs, in frequency, with their noise bands and the shares
+    of the samples that are compared."""
 
     difference: Array
+    """Helmert contrasts of the repeats of every group and output, (n_differences,)."""
     difference_band: NDArray[np.intp]
     difference_share: Array
     mean: Array
+    """Mean of the repeats, scaled to the variance of one run, (n_means,)."""
     mean_band: NDArray[np.intp]
     mean_share: Array
 
@@ -114,11 +91,10 @@ def noise_from_repeats(
 ) -> BandNoise:
     """Noise variance from the contrasts of repeated runs (pure error).
 
-    ``residual``: measured minus predicted, shape (n_rows,). ``known``: signatures that may differ
-    between repeats for a measured reason, such as the temperature, shape (n_rows, k). Their
-    contrasts are projected out where they are noticeable. ``own``: derivatives by unknowns that
-    every run has for itself, shape (n_rows, m). Their contrasts are projected out and their degrees
-    of freedom subtracted.
+    The contrasts of ``known`` (n_rows, k), signatures that may differ between repeats for a
+    measured reason, such as the temperature, are projected out where they are noticeable. Those of
+    ``own`` (n_rows, m), derivatives by unknowns that every run has for itself, are projected out
+    and their degrees of freedom subtracted.
     """
     split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
@@ -146,17 +122,12 @@ def noise_saturated(
 ) -> BandNoise:
     """Noise variance of the residual beside all candidate effects (saturated model).
 
-    ``residual``: measured minus predicted, shape (n_rows,). ``columns``: derivatives by the
-    unknowns and signatures of all candidates, shape (n_rows, p) in parts.
-
-    Notes
-    -----
-    Only inner products per band are formed: an orthonormal basis would be as large as the columns.
-    Two-step estimate: the saturated model is fitted with equal weights within an output, and the
-    variance of each band is that of its residual. It is not iterated: where a real machine has what
-    no candidate explains, reweighting lets the bands with most rows determine the fit, the
-    residual of the others grows at each iteration, and ends above that of no model at all. An
-    effect outside the catalogue is counted as noise.
+    ``columns`` are derivatives by the unknowns and signatures of all candidates, (n_rows, p) in
+    parts, of which only inner products per band are formed: an orthonormal basis would be as large.
+    Two-step estimate: the model is fitted with equal weights within an output, and the variance of
+    each band is that of its residual. It is not iterated: where a real machine has what no
+    candidate explains, reweighting lets the bands with most rows determine the fit, and the
+    residual of the others grows until it is above that of no model at all.
     """
     count = len(regression.bands)
     bands = regression.band_of_row
@@ -231,10 +202,8 @@ def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
 
 
 def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContrasts:
-    """Contrasts and means of repeats, transformed again on their common samples.
-
-    Empty where no run repeats another in any output.
-    """
+    """Contrasts and means of repeats, transformed again on their common samples; empty where no run
+    repeats another in any output."""
     times = dict(
         zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
     )
@@ -332,12 +301,11 @@ def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
 
 
 def satterthwaite_dof(parts: Array, dof: Array, total: Array | None = None) -> Array:
-    """Degrees of freedom of a sum of independently estimated variances.
+    """Degrees of freedom (Σ v)²/Σ (v²/ν) of a sum of variances with the degrees of freedom ν.
 
-    ``parts``: estimated parts of the variance, not negative, shape (k,) or (k, n). ``dof``: their
-    degrees of freedom, of the same shape, or (k, 1). ``total``: the whole variance where known
-    parts are in it as well, shape (n,); by default the sum. Returns (n,): (Σ v)²/Σ (v²/ν); infinite
-    where nothing is estimated.
+    ``parts`` are the estimated variances v, not negative, (k,) or (k, n). ``total`` is the whole
+    variance where known parts are in it as well, (n,). The result is infinite where nothing is
+    estimated.
 
     References
     ----------

@@ -1,7 +1,7 @@
 """Prediction of one run for many hypotheses, with a cache of the stages that they share.
 
 An effect on the motor torque leaves the cable's path unchanged, and a derivative by one unknown
-changes one part of the line. Every stage is therefore cached by the effects that act on it.
+changes one part of the line: every stage is cached by the effects that act on it.
 """
 
 from __future__ import annotations
@@ -136,10 +136,8 @@ def masked(recording: Recording, output: str, signal: Array) -> Array:
 
 
 def _corrected(motion: Motion, correction: float) -> Motion:
-    """Motion with the discretisation error of a known weight's force corrected.
-
-    Hysteresis effects depend on it: the branch changes where the tension has its extremum.
-    """
+    """Motion with the discretisation error of a known weight's force corrected, on which hysteresis
+    depends: the branch changes where the tension has its extremum."""
     if motion.load is None or motion.discretization is None:
         return motion
     load = motion.load + correction * motion.discretization

@@ -14,11 +14,11 @@ LEAST_EIGENVALUE = 1e-8
 
 
 def explained_ss(inner: Array, products: Array, least: float) -> float:
-    """Sum of squares that a set of columns explains jointly.
+    """Sum of squares that a set of columns, of unit length before a projection, explains jointly.
 
-    ``inner``: inner products of the columns after projection, shape (k, k). The columns had unit
-    length before the projection. ``products``: inner products with the residual, shape (k,).
-    ``least``: eigenvalue of ``inner`` below which a direction is not identifiable and left out.
+    ``inner`` (k, k) and ``products`` (k,) are inner products of the projected columns, with each
+    other and with the residual; directions with an eigenvalue below ``least`` are not identifiable
+    and left out.
     """
     return float(explained_ss_of_sets(inner[None], products[None], least)[0])
 
@@ -32,11 +32,10 @@ def explained_ss_of_sets(inner: Array, products: Array, least: float) -> Array:
 
 
 def orthonormal(columns: Array, most: int | None = None) -> Array:
-    """Orthonormal basis of the space of some columns.
+    """Orthonormal basis of the space of some columns, (n_rows, rank).
 
-    ``columns``: shape (n_rows, k); columns of zeros and linearly dependent ones are dropped.
-    ``most``: maximum rank: the directions with the largest eigenvalues are kept, so that a short
-    run keeps degrees of freedom for the noise. Returns: (n_rows, rank).
+    Columns of zeros and linearly dependent ones are dropped. The ``most`` directions with the
+    largest eigenvalues are kept, so that a short run keeps degrees of freedom for the noise.
     """
     size = np.sqrt(np.sum(columns**2, axis=0))
     scaled = columns[:, size > 0] / size[size > 0]
@@ -57,18 +56,15 @@ def partialled_out(columns: Array, vector: Array) -> Array:
 def inverse_normal(columns: Array) -> Array:
     """Pseudo-inverse of the normal matrix: the covariance of unknowns with whitened derivatives.
 
-    ``columns``: shape (n_rows, k), in units of any size. Returns (k, k): zero along columns of
-    zeros and along directions that the rows do not determine.
+    It is zero along columns of zeros and along directions that the rows do not determine; the
+    columns may have units of any size.
     """
     return inverse_information(columns.T @ columns)
 
 
 def inverse_information(normal: Array) -> Array:
-    """Pseudo-inverse of a normal matrix, whose rank does not depend on the units of its unknowns.
-
-    ``normal``: inner products of whitened derivatives, (k, k). Returns (k, k): as
-    :func:`inverse_normal`.
-    """
+    """Pseudo-inverse of a normal matrix, as :func:`inverse_normal`, from the inner products of
+    whitened derivatives; its rank does not depend on the units of the unknowns."""
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     outer = np.outer(size, size)
     scaled = np.divide(normal, outer, out=np.zeros_like(outer), where=outer > 0.0)

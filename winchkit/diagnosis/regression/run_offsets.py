@@ -1,11 +1,10 @@
 """Offsets between runs without repeats: an instrument that has another zero in every run.
 
 Repeats show an offset by their differences (:mod:`winchkit.diagnosis.data.zeroing`). Without them
-it is what the fitted model leaves between the means of runs: an offset per run is added in linear
-approximation, and its decrease of the sum of squares is tested against the variation of the
-residual over blocks of time (batch means, one F test per output). A common offset, and a straight
-line over the mean load and temperature of the runs, are fitted beside, since an effect outside the
-catalogue may be that.
+it is what the fitted model leaves between the means of runs: the decrease of the sum of squares by
+an offset per run, in linear approximation, is tested against the variation over blocks of time
+(batch means, one F test per output). A common offset, and a straight line over the mean load and
+temperature of the runs, are fitted beside, since an effect outside the catalogue may be that.
 
 References
 ----------
@@ -46,10 +45,8 @@ _LEAST_SHARE = 1e-6
 def with_run_offsets(
     dataset: Dataset, regression: TimeSeriesRegression, fit: Fit
 ) -> Dataset | None:
-    """Data set with an offset per run in every output whose run means a fit does not explain.
-
-    Returns: None where no output has another offset in every run, or where repeats decide.
-    """
+    """Data set with an offset per run in every output whose run means a fit does not explain; None
+    where no output has another offset in every run, or where repeats decide."""
     if dataset.repeated:
         return None
     found = [offset_between_runs(regression, fit, output) for output in regression.outputs]
@@ -63,10 +60,10 @@ def with_run_offsets(
 def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str) -> Finding | None:
     """Finding ``zeroed-anew`` of an output; value: standard deviation of the offset, SI.
 
-    Returns: None with fewer than two runs, or where the offsets are within the variation over eight
-    blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random
-    walk from a common zero makes them. None also of a force or torque where the speed is a setting
-    of the runs: friction that depends on it would be taken for offsets.
+    None with fewer than two runs, or where the offsets are within the variation over eight blocks
+    of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random walk from
+    a common zero makes them. None also of a force or torque where the speed is a setting of the
+    runs: friction that depends on it would be taken for offsets.
     """
     dataset = regression.dataset
     if output != "cable_length" and is_setting([motion.motor_rate for motion in dataset.motions]):

@@ -2,8 +2,8 @@
 
 Rows are the discrete cosine transform (DCT-II, orthonormal) of measured minus predicted, within
 each output's band. Nuisance parameters are the offset of the length instrument (one of all runs, or
-one per run of an instrument that was zeroed anew before each) and, where a known weight is the
-load, the correction of its acceleration's discretisation error.
+one per run where it was zeroed anew) and, with a known weight as the load, the correction of its
+acceleration's discretisation error.
 """
 
 from __future__ import annotations
@@ -93,10 +93,8 @@ class TimeSeriesRegression(Regression):
 
     @cached_property
     def _quantisation_power(self) -> Array:
-        """Variance of a spectral coefficient by rounding, mean over every band.
-
-        The error that m repeats share has m times its variance in each: in their mean it is whole.
-        """
+        """Variance of a spectral coefficient by rounding, mean over every band; the error that m
+        repeats share has m times its variance in each, since in their mean it is whole."""
         power = np.zeros(len(self.bands))
         count = np.zeros(len(self.bands))
         repeats = {run: len(group.runs) for group in self.replicates for run in group.runs}
@@ -312,8 +310,8 @@ class TimeSeriesRegression(Regression):
         """Change of the outputs per unit discretisation correction of a weight's acceleration.
 
         Second differences of the angle underestimate the acceleration in proportion to its second
-        derivative and the squared sampling interval; without this nuisance parameter that error
-        is fitted by a lag of the cell.
+        derivative and the squared sampling interval; without this nuisance parameter a lag of the
+        cell is fitted to that error.
         """
         out = np.zeros(self.n_rows)
         for run, recording in enumerate(self.dataset.recordings):

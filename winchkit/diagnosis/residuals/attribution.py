@@ -102,9 +102,9 @@ def _smooth(recording: Recording, *names: str) -> dict[str, Array]:
 def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output the variables that explain its residual, largest share first.
 
-    ``residual`` (rows,). Returns: those whose share exceeds 2 % and three standard deviations of
-    its null distribution; of several names of one variable the first. The time, over which every
-    motion that all runs have in common repeats, only where no other variable explains as much.
+    Their share exceeds 2 % and three standard deviations of its null distribution; of several names
+    of one variable the first is kept. The time, over which every motion that all runs have in
+    common repeats, is kept only where no other variable explains as much.
     """
     out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
@@ -148,11 +148,11 @@ def ranked(found: Sequence[_S]) -> list[_S]:
 
 
 def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
-    """Per output and angle the order whose sine explains most of the residual variance.
+    """Per output and angle the order whose sine explains most of the residual, largest share first.
 
-    ``residual`` (rows,). Returns: orders up to half the samples per turn of which the motion holds
-    two whole periods, largest share first. The share is above 2 %, and above what the largest of
-    all orders explains of independent residuals in 1 % of cases.
+    Orders reach up to half the samples per turn, and the motion holds two whole periods of each.
+    The share is above 2 %, and above what the largest of all orders explains of independent
+    residuals in 1 % of cases.
     """
     times = regression.in_time(residual)
     out = []
@@ -174,10 +174,8 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
 
 
 def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
-    """Number of independent values of an output: coefficients that its low-pass keeps.
-
-    Of a run of which a part is compared they count by that share.
-    """
+    """Number of independent values of an output: coefficients that its low-pass keeps, weighted by
+    the share of each run that is compared."""
     return max(1, round(regression.compared_rows(output)))
 
 
@@ -187,14 +185,7 @@ def chance_share(bins: int, kept: int) -> float:
 
 
 def binned_share(variable: Array, error: Array, kept: int) -> float:
-    """Correlation ratio η² of a residual over bins of a variable, less its expectation.
-
-    ``variable``, ``error`` (n,).
-
-    Notes
-    -----
-    η² = Σ nᵦ mᵦ² / Σ e² over bins of mean m, less (number of bins) / kept.
-    """
+    """Correlation ratio η² = Σ nᵦ mᵦ² / Σ e² over bins of mean m, less (number of bins) / kept."""
     total = float(error @ error)
     if total == 0.0 or np.ptp(variable) == 0.0:
         return 0.0

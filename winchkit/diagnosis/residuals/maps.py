@@ -82,10 +82,7 @@ class ResidualMap:
 
 
 def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[ResidualMap]:
-    """Maps whose cells explain more of a residual than chance, per output the largest share first.
-
-    ``residual`` (rows,).
-    """
+    """Maps whose cells explain more of a residual than chance, per output by descending share."""
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     out: list[ResidualMap] = []
     for output in regression.dataset.outputs:

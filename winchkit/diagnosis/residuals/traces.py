@@ -62,10 +62,9 @@ class PoseTrace:
 def traces_of(
     regression: TimeSeriesRegression, residual: Array, before: Array | None = None
 ) -> tuple[OutputTrace, ...]:
-    """Traces of every output of every run.
+    """Traces of every output of every run, from residuals that are measured less predicted.
 
-    ``residual``: measured less predicted, (n_rows,). ``before``: the same by the profile, where
-    effects were named.
+    ``before`` is the residual of the profile, where effects were named.
     """
     after = regression.in_time(residual)
     first = None if before is None else regression.in_time(before)
