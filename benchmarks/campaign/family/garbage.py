@@ -9,7 +9,7 @@ import numpy as np
 
 from campaign.family.case import ATTEMPTS, OUTPUT, Case, Truth, shown_by
 from campaign.family.instruments import Chain, runs_of
-from campaign.family.machine import Machine, draw_friction, draw_machine
+from campaign.family.machine import Friction, Machine, draw_friction, draw_machine
 from campaign.record import Recording
 from campaign.truth import OUTPUTS, TURN, Shown
 from winchkit.arrays import Array
@@ -163,10 +163,14 @@ def _grounded(random: Random, repeats: int) -> Case:
     truth = Truth(
         f"grounded, {'friction of the motor' if hidden else 'nothing'} hidden, {repeats} recorded",
         (("motor", OUTPUT["motor"]),) if hidden else (),
-        frozenset({"motor-coulomb"}) if hidden else frozenset(),
+        frozenset(name for one in hidden for name in _names_of(one)),
         detail={"garbage": "grounded", "hidden": bool(hidden), "repeats": repeats},
     )
     return Case("garbage", machine.winch, runs, truth, machine.words)
+
+
+def _names_of(friction: Friction) -> tuple[str, ...]:
+    return ("motor-coulomb", "motor-viscous") if friction.viscosity else ("motor-coulomb",)
 
 
 def _put_down(shown: Shown, ground: float) -> Shown:
