@@ -45,6 +45,13 @@ def test_without_a_range_a_bound_is_implausible_and_the_null_is_not() -> None:
     assert reason("motor-coulomb", "torque", 0.0) is None
 
 
+def test_a_value_at_a_bound_of_the_fit_is_implausible_however_wide_its_interval() -> None:
+    """A cell that reads a tenth, ± 60 %: another quantity is in its column."""
+    found = str(reason("cell-gain", "gain_error", -0.9, std=0.3))
+    assert found.startswith("gain_error = −0.9 is at a bound of the fit")
+    assert reason("cell-gain", "gain_error", -0.6, std=0.3) is None
+
+
 def test_an_undetermined_value_is_not_judged() -> None:
     assert reason("drum-winding-tension", "fraction", 0.05, std=nan) is None
     assert reason("cell-clipping", "share", 1.0, std=nan) is None

@@ -27,11 +27,11 @@ def implausible(
 ) -> str | None:
     """Reason why the values of an effect are implausible; None where they are plausible.
 
-    A value is beyond its plausible range where its whole 95 % interval is; where no range is
-    declared, a value at a bound of the fit other than the null is. A value that the data do not
-    determine (NaN standard deviation) is judged only where a shape is held at an end of its range:
-    there the law is that of another effect, such as a spring or an offset of Dahl's. The inertia of
-    an axis has no range: it includes the arm or carriage that the axis moves.
+    A value is implausible at a bound of the fit other than the null, and where its whole 95 %
+    interval is beyond its plausible range. A value that the data do not determine (NaN standard
+    deviation) is judged only where a shape is held at an end of its range: there the law is that of
+    another effect, such as a spring or an offset of Dahl's. The inertia of an axis has no range: it
+    includes the arm or carriage that the axis moves.
     """
     reasons = (
         implausible_value(term.effect.parameter(name), estimate, profile)
@@ -54,9 +54,10 @@ def implausible_value(
         return f"{shown} is at the end of the plausible range ({known[2]}): {advice}"
     if not isfinite(estimate.std):
         return None
+    if _is_held(estimate.value, (parameter.low, parameter.high), parameter):
+        return f"{shown} is at a bound of the fit: {_CHECK}"
     if known is None:
-        held = _is_held(estimate.value, (parameter.low, parameter.high), parameter)
-        return f"{shown} is at a bound of the fit: {_CHECK}" if held else None
+        return None
     low, high, reason = known
     bottom, top = estimate.interval or (estimate.value, estimate.value)
     if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
