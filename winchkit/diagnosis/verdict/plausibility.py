@@ -7,7 +7,7 @@ sign or unit of a channel, the torque constant, or gravity. Such an effect is no
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import isfinite
+from math import inf, isfinite
 from operator import attrgetter
 
 from winchkit.diagnosis.results import Estimate
@@ -56,9 +56,7 @@ def implausible_value(
         return None
     if _is_held(estimate.value, (parameter.low, parameter.high), parameter):
         return f"{shown} is at a bound of the fit: {_CHECK}"
-    if known is None:
-        return None
-    low, high, reason = known
+    low, high, reason = known or (-inf, inf, "")
     bottom, top = estimate.interval or (estimate.value, estimate.value)
     if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
         span = f"{_text(low, parameter)} to {_text(high, parameter)}"
