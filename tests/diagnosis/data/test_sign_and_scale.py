@@ -168,20 +168,6 @@ def test_friction_and_inertia_determine_the_sign_without_a_load(seed: int) -> No
     assert codes([joint(seed, -1.0)[0]]) == [("motor_torque", "inverted-sign")]
 
 
-@given(st.integers(0, 2**31))
-@settings(max_examples=20, deadline=None)
-def test_a_joint_that_a_hand_pushes_unevenly_shows_its_sign(seed: int) -> None:
-    """Its friction is three times as large in the first of eight blocks of time."""
-    run, random = joint(seed, 1.0)[0], np.random.default_rng(seed)
-    angle = np.sin(0.9 * run.time) + 0.4 * np.sin(2.3 * run.time + 1)
-    rate = np.gradient(angle, run.time)
-    torque = (0.3 * rate + 0.5 * np.sign(rate)) * np.where(run.time < 5.0, 3.3, 1.0)
-    torque += 1 + random.normal(0, 0.05, len(angle))
-    run = with_channel(run, "motor_angle", angle, "rad")
-    for sign, found in ((1.0, []), (-1.0, [("motor_torque", "inverted-sign")])):
-        assert codes([with_channel(run, "motor_torque", sign * torque, "N m")]) == found
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_friction_of_runs_in_one_direction_each_determines_the_sign(sign: float) -> None:
     """A ladder of speeds: the friction of a run is an offset that follows its direction."""

@@ -46,9 +46,6 @@ _SIGMAS = 5.0
 1 of 600 cases, on top of a range that no effect reaches."""
 MOST_SAMPLES = 20_000
 """Samples on which a slope is fitted; computing cost, rule of thumb."""
-_WORK_SIGMAS = 4.0
-"""The same of the work of friction, which has one sign: Student's t of eight blocks is as large by
-chance in 1 of 380 cases, and a joint that a hand moves works unevenly."""
 _EQUAL = 1.1
 """Ratio up to which slopes are equal: of tension and torque, where the load is wrong instead; of
 runs, where a factor may be wrong in others; effects change a slope by less than 10 %."""
@@ -322,7 +319,7 @@ def _passivity(runs: Sequence[Run], profile: WinchProfile) -> Iterator[Finding]:
     power = without[:, 0] * np.mean(np.abs(rate)) + without[:, 1] * np.mean(rate**2)
     mean, std = float(power.mean()), _jackknife_std(power)
     inertia = without[:, -1]
-    if mean < -_WORK_SIGMAS * std and float(inertia.mean()) <= _SIGMAS * _jackknife_std(inertia):
+    if mean < -_SIGMAS * std and float(inertia.mean()) <= _SIGMAS * _jackknife_std(inertia):
         text = (
             "the sign looks inverted: friction would do work on the motor, "
             f"{slope_text(Slope(mean, std))} W"
