@@ -87,9 +87,6 @@ def steps_of(
     return tuple(out)
 
 
-_LEFT = "the error that it leaves is more than a tenth of what it explains"
-
-
 @dataclass(frozen=True)
 class Standing:
     """What one step explains of the excess, and what is left where it acts."""
@@ -134,7 +131,7 @@ def standing_of(
     chances = [p for name in there if (p := outputs[name].p_value) is not None]
     remaining = ""
     if not trusted or left > CERTAIN * explained:
-        remaining = _LEFT
+        remaining = "the error that it leaves is more than a tenth of what it explains"
     elif left + known_to > CERTAIN * explained:
         remaining = (
             "the noise is not known to a tenth of what it explains: it may be another effect"

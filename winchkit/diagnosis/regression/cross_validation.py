@@ -35,9 +35,6 @@ _MOST_EXACT = 50
 approximation is within 10⁻³ of it."""
 AT_NOISE = 1.1
 """Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
-BY_CHANCE = 0.001
-"""Probability above which a misfit is noise, whatever its size; convention: of 80 sessions of the
-shipped spiral bench, which have no effect, seven have an output above 1.1 times its noise."""
 CERTAIN = 0.1
 """Share of what a step explains that may be left unexplained in its outputs where it is certain:
 the tenth of the verdict ``explained``."""

@@ -52,8 +52,7 @@ def lack_of_fit_test(
     if not noise.from_repeats:
         nothing = np.zeros(count)
         return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
-    total, dof = _power_of_means(regression, residual, jacobian, noise)
-    p = np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power))
+    total, dof, p = _tested_means(regression, residual, jacobian, noise)
     tested = max(count, 1)
     worst = float(min(1.0, p.min() * tested)) if count else 1.0
     return LackOfFitTest(worst, total / noise.power - dof, p * tested < BAND_LEVEL)
@@ -68,9 +67,8 @@ def output_p_values(
     the sum of squares over all bands, σ̂_b² ν_b F(ν_b, ν̂_b). Coloured noise has most of its power
     in bands with few degrees of freedom: there the ratio of two rms values says little.
     """
-    total, dof = _power_of_means(regression, residual, jacobian, noise)
-    p, size = np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power)), noise.power * dof
-    out = {}
+    total, dof, p = _tested_means(regression, residual, jacobian, noise)
+    out, size = {}, noise.power * dof
     for output in regression.outputs:
         own = np.array([band[0] == output for band in regression.bands])
         draws = np.random.default_rng(1).f(dof[own], noise.dof[own], (_DRAWS, own.sum()))
@@ -79,10 +77,10 @@ def output_p_values(
     return out
 
 
-def _power_of_means(
+def _tested_means(
     regression: Regression, residual: Array, jacobian: Array, noise: BandNoise
-) -> tuple[Array, Array]:
-    """Sum of squares of the means of repeats, and its degrees of freedom, by band."""
+) -> tuple[Array, Array, Array]:
+    """Sum of squares of the means of repeats, its degrees of freedom and its p-value, by band."""
     count = len(regression.bands)
     split = replicate_contrasts(regression, residual)
     total = sums_per_band(split.mean**2, split.mean_band, count)
@@ -90,4 +88,5 @@ def _power_of_means(
     basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
     # Each fitted unknown takes degrees of freedom in proportion to its leverage.
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)
-    return total, np.maximum(dof - taken, 1.0)
+    dof = np.maximum(dof - taken, 1.0)
+    return total, dof, np.asarray(fdtrc(dof, noise.dof, total / dof / noise.power))
