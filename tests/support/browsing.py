@@ -102,3 +102,27 @@ def number(text: str) -> float:
 def texts(page: Any, selector: str) -> list[str]:
     """Texts of the elements of a selector."""
     return [str(text) for text in page.locator(selector).all_inner_texts()]
+
+
+_KEPT = """() => { window.kept = null;
+    const blobs = {}, made = URL.createObjectURL, click = HTMLAnchorElement.prototype.click;
+    URL.createObjectURL = (blob) => { const url = made(blob); blobs[url] = blob; return url; };
+    HTMLAnchorElement.prototype.click = async function () {
+        URL.createObjectURL = made;
+        HTMLAnchorElement.prototype.click = click;
+        const bytes = new Uint8Array(await blobs[this.href].arrayBuffer());
+        window.kept = [this.download, Array.from(bytes)]; }; }"""
+
+
+def saved_as(page: Any, name: str, kind: str) -> bytes:
+    """Content of the file that the menu of a plot saves.
+
+    It is taken from the page's own link: Chromium refuses a second download of a page where it
+    has not yet seen an action of the user.
+    """
+    page.evaluate(_KEPT)
+    page.select_option(f"[aria-label='Save {name}']", kind)
+    until(page, lambda: page.evaluate("Boolean(window.kept)"))
+    file, content = page.evaluate("window.kept")
+    assert file == f"{name}.{kind.lower()}"
+    return bytes(content)

@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import NEEDS_CHROMIUM, Served, number, opened, texts, until
+from browsing import NEEDS_CHROMIUM, Served, number, opened, saved_as, texts, until
 
 pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 SMALL = """() => [...document.querySelectorAll("button, select, input, a, summary")]
@@ -69,33 +69,30 @@ def test_the_pointer_reads_value_unit_time_and_run_in_both_plots(
     page.context.close()
 
 
-def ticks(page: Any, name: str, path: Path) -> list[str]:
+def ticks(page: Any, name: str) -> list[str]:
     """y ticks of the first panel of an exported drawing."""
-    with page.expect_download() as waiting:
-        page.select_option(f"[aria-label='Save {name}']", "SVG")
-    waiting.value.save_as(path)
-    panel = ElementTree.parse(path).getroot().find(".//{*}g/{*}g")
+    panel = ElementTree.fromstring(saved_as(page, name, "SVG")).find(".//{*}g/{*}g")
     assert panel is not None
     return [str(text.text) for text in panel.iter() if text.get("text-anchor") == "end"]
 
 
 def test_a_kept_range_outlives_a_zoom_and_is_that_of_the_exports(
-    browser: Any, served: Served, tmp_path: Path
+    browser: Any, served: Served
 ) -> None:
     page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
     name = "cable_length-over-time"
     menu = f"[aria-label='Save {name}']"
     page.select_option(menu, "Keep this range")
-    before = ticks(page, name, tmp_path / "before.svg")
+    before = ticks(page, name)
     box = page.locator("#time .u-over").first.bounding_box()
     page.mouse.move(box["x"] + 0.95 * box["width"], box["y"] + 20)
     for _ in range(8):
         page.mouse.wheel(0, -300)
         page.wait_for_timeout(250)
     until(page, lambda: page.locator("text=Whole record").count() == 1)
-    assert ticks(page, name, tmp_path / "kept.svg") == before
+    assert ticks(page, name) == before
     page.select_option(menu, "Fit to the values")
-    assert ticks(page, name, tmp_path / "free.svg") != before
+    assert ticks(page, name) != before
     assert complaints == []
     page.context.close()
 
@@ -162,21 +159,44 @@ def test_any_channel_over_another_is_chosen_drawn_and_saved(
     page.context.close()
 
 
-def drawing(page: Any, name: str, path: Path) -> list[str]:
-    """Texts of an exported drawing."""
-    with page.expect_download() as waiting:
-        page.select_option(f"[aria-label='Save {name}']", "SVG")
-    waiting.value.save_as(path)
-    return [str(node.text) for node in ElementTree.parse(path).findall(".//{*}text")]
+def test_an_answer_that_arrives_late_does_not_replace_the_newest_one(
+    browser: Any, served: Served
+) -> None:
+    page, complaints = diagnosed(browser, f"{served.url}#diagnose")
+    held: list[Any] = []
+
+    def hold(route: Any) -> None:
+        held.append(route)
+
+    page.route("**/api/lines*channel=motor_torque&over=motor_angle", hold)
+    page.click("#channels summary")
+    page.select_option("#channels [aria-label=Channel]", "motor_torque")
+    until(page, lambda: bool(page.title() and held))
+    page.select_option("#channels [aria-label=Over]", "temperature")
+    title = page.locator("#channels h3").first
+    until(page, lambda: title.count() == 1 and "over temperature" in title.inner_text())
+    with page.expect_response("**/api/lines*over=motor_angle") as late:
+        held[0].continue_()
+    late.value.finished()
+    page.evaluate("new Promise((done) => setTimeout(done, 200))")
+    assert "over temperature" in title.inner_text()
+    assert complaints == []
+    page.context.close()
+
+
+def drawing(page: Any, name: str) -> tuple[str, list[str]]:
+    """An exported drawing and its texts."""
+    drawn = saved_as(page, name, "SVG").decode()
+    return drawn, [str(node.text) for node in ElementTree.fromstring(drawn).findall(".//{*}text")]
 
 
 LABELS = """() => [...document.querySelectorAll("#ladder .name > span:first-child")]
     .map((one) => one.firstChild.textContent)"""
 
 
-def test_exports_show_what_is_seen(browser: Any, served: Served, tmp_path: Path) -> None:
+def test_exports_show_what_is_seen(browser: Any, served: Served) -> None:
     page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
-    ladder = drawing(page, "ladder", tmp_path / "ladder.svg")
+    _, ladder = drawing(page, "ladder")
     labels = page.evaluate(LABELS)
     assert len(labels) > 2
     assert {*labels, *filter(None, texts(page, "#ladder .value"))} <= set(ladder)
@@ -188,14 +208,14 @@ def test_exports_show_what_is_seen(browser: Any, served: Served, tmp_path: Path)
     page.mouse.move(box["x"] + 60, box["y"] + 30, steps=4)
     page.mouse.up()
     until(page, lambda: "samples" in page.inner_text("#brush"))
-    curves = drawing(page, "cable_length-over-time", tmp_path / "time.svg")
+    time, curves = drawing(page, "cable_length-over-time")
     loads = {text.rpartition(" ")[0].split()[-1] for text in curves if text.endswith(" kg")}
     assert loads == {"10", "20"}, "each run with its load"
     marked = "#7B2FA8"
-    assert marked in (tmp_path / "time.svg").read_text()
-    shares = drawing(page, "cable_length-residual", tmp_path / "over.svg")
+    assert marked in time
+    over, shares = drawing(page, "cable_length-residual")
     assert sum(text.endswith(" %") for text in shares) == page.locator("#over h3").count()
-    assert marked in (tmp_path / "over.svg").read_text()
+    assert marked in over
     assert complaints == []
     page.context.close()
 

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import NEEDS_CHROMIUM, Served, opened, texts, until
+from browsing import NEEDS_CHROMIUM, Served, opened, saved_as, texts, until
 from recordings_of_others import lay_out
 from robot_poses.truth import Truth, csv, poses
 from winchkit.runs.writer import write_run
@@ -176,17 +176,6 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
     served.end()
 
 
-def saved_as(page: Any, name: str, kind: str, folder: Path) -> Path:
-    """A file that the menu of a plot saves; the key before it makes it a choice of a user."""
-    menu = page.locator(f"[aria-label='Save {name}']")
-    with page.expect_download() as waiting:
-        menu.press("Home")
-        menu.select_option(kind)
-    path = folder / f"{name}.{kind.lower()}"
-    waiting.value.save_as(path)
-    return path
-
-
 def rail(page: Any) -> float:
     """Place of the rail of today's error in the focused column, per cent of its drawing."""
     place = page.locator(".ladder .cell.focus line.rail").first.get_attribute("x1")
@@ -261,9 +250,9 @@ def test_the_rail_slides_to_the_new_error_or_its_earlier_place_stays_dotted(
 
 
 def test_every_plot_is_saved_with_its_title_its_runs_its_profile_and_the_version(
-    browser: Any, example: Served, tmp_path: Path
+    browser: Any, example: Served
 ) -> None:
-    page, complaints = opened(browser, example.url, accept_downloads=True, color_scheme="dark")
+    page, complaints = opened(browser, example.url, color_scheme="dark")
     until(page, lambda: page.locator("#card .exports").count() == 1)
     until(page, lambda: page.locator("#over .exports").count() == 1)
     until(page, lambda: page.locator("#time .exports").count() == 1)
@@ -275,7 +264,7 @@ def test_every_plot_is_saved_with_its_title_its_runs_its_profile_and_the_version
     ]
     assert len(labels) == 4
     for name in labels:
-        drawn = saved_as(page, name, "SVG", tmp_path).read_text()
+        drawn = saved_as(page, name, "SVG").decode()
         root = ElementTree.fromstring(drawn)
         words = " ".join(root.itertext())
         assert "var(" not in drawn
@@ -283,10 +272,10 @@ def test_every_plot_is_saved_with_its_title_its_runs_its_profile_and_the_version
         assert f"profile {runs['profile']['name']}" in words
         assert f"winchkit {runs['version']}" in words
         assert all(run in words for run in names)
-        table = saved_as(page, name, "CSV", tmp_path).read_text().splitlines()
+        table = saved_as(page, name, "CSV").decode().splitlines()
         assert table[0].startswith("# ")
         assert len(table) > 4
-        picture = saved_as(page, name, "PNG", tmp_path).read_bytes()
+        picture = saved_as(page, name, "PNG")
         assert picture[:8] == b"\x89PNG\r\n\x1a\n"
         wide = int.from_bytes(picture[16:20], "big")
         assert wide == 2 * float(root.get("width"))
@@ -315,10 +304,7 @@ def test_a_robot_is_calibrated_turned_and_saved(
     page.keyboard.press("ArrowRight")
     until(page, lambda: "Pose 1 of 60" in page.inner_text("#picture"))
     page.click("text=Top")
-    with page.expect_download() as drawn:
-        page.select_option("[aria-label='Save robot']", "SVG")
-    drawn.value.save_as(tmp_path / "robot.svg")
-    text = (tmp_path / "robot.svg").read_text()
+    text = saved_as(page, "robot", "SVG").decode()
     assert "poses.csv" in text
     assert "var(" not in text
     with page.expect_download() as saved:

@@ -1,5 +1,5 @@
 // Channels of runs over time or over each other: a panel of Diagnose, and the Library's overlay.
-import { ask, attempt, el, fill, sourceOf } from "./page.js";
+import { ask, drawAnswer, el, fill, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { dots, line, plot, sorted } from "./plots.js";
 
@@ -39,10 +39,8 @@ export function channelPanel({ runs }) {
   const used = runs.filter((run) => run.used), known = [...new Set(used.flatMap((run) => run.channels))], box = el("div", {});
   if (!known.includes(channel)) channel = known[0];
   if (over !== TIME && !known.includes(over)) over = TIME;
-  const draw = () => attempt(async () => {
-    const found = await ask(`/api/lines?channel=${encodeURIComponent(channel)}&over=${encodeURIComponent(over)}`);
-    if (box.isConnected) drawLines(box, found, used.map((run) => run.name).join(", "), used.length > MOST ? `the first ${MOST} runs` : "");
-  });
+  const draw = () => drawAnswer(box, () => ask(`/api/lines?channel=${encodeURIComponent(channel)}&over=${encodeURIComponent(over)}`),
+    (found) => drawLines(box, found, used.map((run) => run.name).join(", "), used.length > MOST ? `the first ${MOST} runs` : ""));
   return el("section", { class: "panel", id: "channels", style: { marginTop: "16px" } }, el("details", { open: shown, ontoggle: (event) => { shown = event.target.open; if (shown) draw(); } }, el("summary", {}, "Any channel over another"),
     el("div", { class: "row" }, choice("Channel", known, channel, (name) => { channel = name; draw(); }), el("span", { class: "label" }, "over"), choice("Over", [TIME, ...known], over, (name) => { over = name; draw(); })), box));
 }

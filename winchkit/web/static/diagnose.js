@@ -1,5 +1,5 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
-import { ask, attempt, closeDialog, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
+import { ask, attempt, closeDialog, dialog, download, drawAnswer, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
 import { channelPanel } from "./channels.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
@@ -235,9 +235,7 @@ function subscripted(text) {
 async function drawCard() {
   const box = root.querySelector("#card"), effect = shown.effect;
   if (!box) return;
-  await attempt(async () => {
-    const card = cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`));
-    if (effect !== shown.effect || !box.isConnected) return;
+  await drawAnswer(box, async () => cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`)), (card) => {
     const host = el("div", { class: "plot" });
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}. To decide: ${card.told_apart}`) : null;
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
@@ -256,9 +254,7 @@ async function drawPattern() {
   const box = root.querySelector("#pattern"), next = root.querySelector("#next"), [title] = view.diagnosis.patterns;
   fill(box, el("header", {}, el("h2", {}, title)));
   fill(next, el("h2", {}, "What to do next"));
-  await attempt(async () => {
-    const found = await ask("/api/pattern?number=0");
-    if (!box.isConnected) return;
+  await drawAnswer(box, () => ask("/api/pattern?number=0"), (found) => {
     const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
     fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
     const { columns } = sorted(found.x, found.residual);
@@ -306,11 +302,8 @@ export const add = (effect) => attempt(() => order("add", { effect }));
 async function drawTime() {
   const box = root.querySelector("#time"), output = shown.output;
   if (!box) return;
-  await attempt(async () => {
-    const width = Math.max(300, box.clientWidth - 32);
-    const query = span ? `&from=${span[0]}&to=${span[1]}` : "";
-    const data = await ask(`/api/curve?output=${output}&points=${Math.round(width * 2)}${query}`);
-    if (output !== shown.output || !box.isConnected) return;
+  const width = Math.max(300, box.clientWidth - 32), query = span ? `&from=${span[0]}&to=${span[1]}` : "";
+  await drawAnswer(box, () => ask(`/api/curve?output=${output}&points=${Math.round(width * 2)}${query}`), (data) => {
     const upper = el("div", { class: "plot" }), lower = el("div", { class: "plot" });
     const runs = data.runs.map((run) => ({ ...run, labelled: true }));
     const zoom = (low, high) => {
@@ -346,9 +339,7 @@ async function drawTime() {
 async function drawMultiples() {
   const box = root.querySelector("#over"), output = shown.output;
   if (!box) return;
-  await attempt(async () => {
-    const found = await ask(`/api/multiples?output=${output}${over.map((name) => `&over=${encodeURIComponent(name)}`).join("")}`);
-    if (output !== shown.output || !box.isConnected) return;
+  await drawAnswer(box, () => ask(`/api/multiples?output=${output}${over.map((name) => `&over=${encodeURIComponent(name)}`).join("")}`), (found) => {
     const grid = el("div", { class: "multiples" }), drawnOver = found.panels.map((panel) => panel.variable), others = found.variables.filter(([name]) => !drawnOver.includes(name));
     const another = others.length ? el("select", { class: "another", "aria-label": "Another variable", onchange: () => { over = [another.value, ...drawnOver.slice(0, -1)]; drawMultiples(); } }, el("option", { value: "" }, "Over…"), others.map(([name, words]) => el("option", { value: name }, words))) : null;
     fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), el("span", { class: "row end" }, another, exporter(`${output}-residual`, () => multiplesFigure(found)))), grid);

@@ -1,5 +1,5 @@
 // The Library view: runs of the folder in sets, overlaid, opened in Diagnose; and the fleet.
-import { ask, attempt, el, fill, icon, number, order, svg } from "./page.js";
+import { ask, attempt, drawAnswer, el, fill, icon, number, order, svg } from "./page.js";
 import { MOST as MOST_LINES, TIME, choice, drawLines } from "./channels.js";
 import * as fleet from "./fleet.js";
 
@@ -118,9 +118,10 @@ function shapes(ratios) {
 
 async function overlay() {
   const box = document.getElementById("overlay");
-  if (!box || !chosen.size) { if (box) fill(box, el("p", { class: "note" }, "Choose runs of the list.")); return; }
+  if (!box) return;
   const names = [...chosen].slice(0, MOST_LINES).map((name) => `&name=${encodeURIComponent(name)}`).join("");
-  await attempt(async () => drawLines(box, await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&over=${encodeURIComponent(over)}${names}`), `folder ${found.folder}`, chosen.size > MOST_LINES ? `the first ${MOST_LINES} runs` : ""));
+  await drawAnswer(box, async () => (names ? ask(`/api/overlay?channel=${encodeURIComponent(channel)}&over=${encodeURIComponent(over)}${names}`) : null),
+    (lines) => (lines ? drawLines(box, lines, `folder ${found.folder}`, chosen.size > MOST_LINES ? `the first ${MOST_LINES} runs` : "") : fill(box, el("p", { class: "note" }, "Choose runs of the list."))));
 }
 
 export function keys(event) {

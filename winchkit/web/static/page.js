@@ -181,3 +181,12 @@ export const filesOf = (field) => { const files = [...field.files]; field.value 
 export async function attempt(action) {
   try { await action(); } catch (error) { alarm(error.message); }
 }
+
+// Draws in a box the answer to the newest question for it: answers arrive in any order, and the box may be gone by then.
+const newest = new WeakMap();
+export const drawAnswer = (box, question, draw) => attempt(async () => {
+  const own = {};
+  newest.set(box, own);
+  const answer = await question();
+  if (box.isConnected && newest.get(box) === own) draw(answer);
+});

@@ -1,5 +1,5 @@
 // Two profiles, or two sets of runs, side by side: errors, ladders and residuals on the same axes.
-import { ask, attempt, el, icon, number, sourceOf } from "./page.js";
+import { ask, drawAnswer, el, icon, number, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { ladderGrid, presentName, reach } from "./ladder.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
@@ -72,10 +72,8 @@ const ends = (values) => values.reduce(([low, high], value) => (value === null ?
 const wider = ([low, high]) => [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)];
 
 async function drawTimes(view, output, boxes) {
-  await attempt(async () => {
-    const width = Math.max(300, boxes[0].clientWidth - 32), part = span ? `&from=${span[0]}&to=${span[1]}` : "";
-    const found = await answers(view, `/api/curve?output=${output}&points=${Math.round(2 * width)}${part}`);
-    if (!boxes[0].isConnected) return;
+  const width = Math.max(300, boxes[0].clientWidth - 32), part = span ? `&from=${span[0]}&to=${span[1]}` : "";
+  await drawAnswer(boxes[0], () => answers(view, `/api/curve?output=${output}&points=${Math.round(2 * width)}${part}`), (found) => {
     const whole = [0, Math.max(...found.map((data) => data.last))], xRange = span || whole;
     const signal = wider(ends(found.flatMap((data) => [...data.measured, ...data.predicted]))), residual = wider(ends(found.flatMap((data) => [...data.residual, data.noise, data.noise && -data.noise].filter((v) => v !== null))));
     const zoom = (low, high) => {
@@ -96,11 +94,12 @@ async function drawTimes(view, output, boxes) {
 }
 
 async function drawOver(view, output, boxes) {
-  await attempt(async () => {
-    const most = await answers(view, `/api/multiples?output=${output}`);
-    const shares = most.flatMap((own) => own.panels).sort((a, b) => b.share - a.share), names = [...new Set(shares.map((panel) => panel.variable))].slice(0, 3);
-    const found = await answers(view, `/api/multiples?output=${output}${names.map((name) => `&over=${name}`).join("")}`);
-    if (!boxes[0].isConnected) return;
+  let names;
+  await drawAnswer(boxes[0], async () => {
+    const most = await answers(view, `/api/multiples?output=${output}`), shares = most.flatMap((own) => own.panels).sort((a, b) => b.share - a.share);
+    names = [...new Set(shares.map((panel) => panel.variable))].slice(0, 3);
+    return answers(view, `/api/multiples?output=${output}${names.map((name) => `&over=${name}`).join("")}`);
+  }, (found) => {
     const range = sym(found.flatMap((own) => own.residual));
     found.forEach((own, i) => {
       const grid = el("div", { class: "multiples" }), tone = tones(view, output)[i];
