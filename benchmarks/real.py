@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from campaign.rivals import SELECTIONS, Regression, all_columns, in_time
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.search import selection_engine

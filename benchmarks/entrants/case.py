@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.spectrum import to_time
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression

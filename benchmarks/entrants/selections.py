@@ -24,7 +24,7 @@ from campaign.rivals import (
 )
 from entrants.case import Case
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue

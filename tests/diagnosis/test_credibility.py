@@ -7,7 +7,7 @@ import pytest
 
 from diagnosis_runs import Ride, engine_for, term
 from winchkit.diagnosis.credibility import oversized, short_record
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue

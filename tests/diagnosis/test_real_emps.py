@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from winchkit.diagnosis.add import Addition, add
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.search import selection_engine

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.standstill import standstill_mask
 from winchkit.runs import read_run
 from winchkit.schema.read import read_profile

@@ -17,7 +17,7 @@ from scipy import stats
 from scipy.fft import dct
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
 from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from winchkit.arguments import require_type, require_types
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.sanity import ALARMING, require_drive
 from winchkit.diagnosis.linear_axis import errors_in_units_of, in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import overload
 
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.sanity import caveats, unrelated
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs

@@ -20,7 +20,8 @@ from typing import Any, Protocol
 
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import initial_residual
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
 from winchkit.diagnosis.new_effect import new_effect, order_of_drum
 from winchkit.diagnosis.plan import plan

@@ -11,7 +11,7 @@ import pytest
 from model_files import answer, invoke, record_files
 from winchkit.catalog import find
 from winchkit.cli.model.plan import suggest_run
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.plan import programme_of
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, usual_temperature
 from winchkit.runs import read_run, write_run

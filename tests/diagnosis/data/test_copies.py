@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from diagnosis_runs import GROOVED, NOISE, Ride, made
 from winchkit.diagnosis.data.copies import without_copies
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.runs.run import Run
 
 LONG = Ride(samples=900, period=6.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, with_channel
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.schema.profiles.winch import WinchProfile
 
 THICK = replace(SPIRAL, drum=replace(SPIRAL.drum, layer_growth=1e-3))

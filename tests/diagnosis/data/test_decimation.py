@@ -9,8 +9,9 @@ import pytest
 
 from diagnosis_runs import CATALOGUE, GROOVED
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import Filtering, assemble, prepare
+from winchkit.diagnosis.data.dataset import Filtering, assemble
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import spread_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression

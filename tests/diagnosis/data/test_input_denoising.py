@@ -8,13 +8,13 @@ from scipy.signal import lfilter
 
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from winchkit.diagnosis.add import add
-from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.input_denoising import (
     contrasts,
     shared_by_instruments,
     shared_by_repeats,
     wiener_filtered,
 )
+from winchkit.diagnosis.data.preparation import prepare
 
 COUNT = 2000
 

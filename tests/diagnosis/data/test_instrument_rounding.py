@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, Array
-from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.instrument_rounding import instrument_noise, rounding_errors
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run
 

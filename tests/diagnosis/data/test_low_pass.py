@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.low_pass import UnfilteredOutput, removed_by_low_pass, torque_cut_off
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, UNITS, Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.runs.run import Channel, Run

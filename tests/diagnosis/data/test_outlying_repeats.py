@@ -7,7 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import SEPARATED, prepare
+from winchkit.diagnosis.data.dataset import SEPARATED
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.repeats import Repeats, outlying_repeat, separated
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile

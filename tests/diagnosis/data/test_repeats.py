@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats, mean_load
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Run

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.requirements import missing_needs
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.runs.run import Channel, Run

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from diagnosis_runs import GROOVED, Ride, made, term
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.sampling import away_from, even_instants
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue

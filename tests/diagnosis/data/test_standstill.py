@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.standstill import STANDSTILL, spread_at_standstill
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run

@@ -11,7 +11,7 @@ import pytest
 
 from diagnosis_runs import GROOVED, made, with_channel
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.statics import is_at_rest
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis

@@ -10,7 +10,7 @@ from scipy.stats import ttest_1samp
 
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.zeroing import is_random_walk, zeroed_anew
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, with_channel
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.runs.run import Run

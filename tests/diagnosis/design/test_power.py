@@ -11,7 +11,8 @@ from scipy.stats import f, norm
 
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from winchkit.cli.model.plan import _silent
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import information_of, next_runs, power_of, separation
 from winchkit.diagnosis.design.plan import inseparable

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.coarse import CoarseTimeSeries, coarse_regression
 from winchkit.diagnosis.regression.gls import CoarseProblem, RequiredChiSquare, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.cross_validation import (
     Folds,
     extrapolation,

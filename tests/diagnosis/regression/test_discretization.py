@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.discretization import interpolated, without_discretization_error
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis

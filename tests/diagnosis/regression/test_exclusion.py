@@ -9,7 +9,8 @@ import pytest
 
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
-from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.hypothesis import Hypothesis

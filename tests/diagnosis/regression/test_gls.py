@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression

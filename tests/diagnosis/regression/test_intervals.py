@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import (

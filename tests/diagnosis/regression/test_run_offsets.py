@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add, remove
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression import run_offsets
 from winchkit.diagnosis.regression.gls import Fit, fit

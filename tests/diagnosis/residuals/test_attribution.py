@@ -11,7 +11,7 @@ import pytest
 from diagnosis_runs import GROOVED, Ride, made, recorded, with_channel
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, ranked
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects import load_catalogue

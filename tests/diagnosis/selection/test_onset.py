@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.spectrum import to_frequency, to_time
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.noise import noise_saturated

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.prediction_cache import masked
 from winchkit.diagnosis.search import selection_engine

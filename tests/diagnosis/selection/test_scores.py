@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.noise import satterthwaite_dof
 from winchkit.diagnosis.results import Diagnosis

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import Catalogue

@@ -8,7 +8,7 @@ import pytest
 from diagnosis_runs import CATALOGUE as EVERY
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.search import selection_engine

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, Array, Ride, engine_for, made, term
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.conditioning import ValueCovariance, value_covariance
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.cli.files.check import command
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.ground import ground_mask
 from winchkit.runs.sanity.inspection import inspect_run

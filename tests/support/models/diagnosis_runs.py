@@ -11,7 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.catalog import find
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection

@@ -18,7 +18,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.compare import initial_hypothesis
-from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.projection import inverse_normal
