@@ -80,6 +80,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "torque-lead": {"lead": ("s", 0)},
     "prediction-delay": {"delay": ("s", 0)},
     "joint-gravity": {"amplitude": ("N m", 0), "phase": ("rad", SHAPE)},
+    "joint-payload": {"lever": ("m", 0), "phase": ("rad", SHAPE)},
     "drum-unbalance": {"amplitude": ("N m", 0), "phase": ("rad", SHAPE)},
     "load-lever": {"amplitude": ("1", 0), "phase": ("rad", SHAPE)},
     "spring-balancer": {"stiffness": ("N m/rad", 0), "torque": ("N m", 0)},

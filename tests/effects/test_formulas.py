@@ -19,6 +19,7 @@ G = 9.80665
 RADIUS, GROWTH, RATIO, DEAD, LENGTH, TURNS = 0.06, 0.006, 20.4, 1.5, 6.0, 4.3
 WRAPS = (pi / 2, pi)
 INCLINATION = pi / 3
+PAYLOAD = 5.0
 
 
 def _state() -> SimpleNamespace:
@@ -298,6 +299,12 @@ CASES: dict[str, Case] = {
     "joint-gravity": (
         {"amplitude": 0.6, "phase": 0.4},
         lambda: _torque(0.6 * (cos(0.4) * np.sin(X.phi) + sin(0.4) * np.cos(X.phi))),
+    ),
+    "joint-payload": (
+        {"lever": 0.4, "phase": 0.4},
+        lambda: _torque(
+            PAYLOAD * (G * 0.4 * np.sin(X.phi + 0.4) + 0.4**2 * X.alpha / RATIO) / RATIO
+        ),
     ),
     "drum-unbalance": (
         {"amplitude": 0.02, "phase": -0.4},

@@ -20,6 +20,7 @@ Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
     "axis", "ungeared", "whole_turns", "torque", "prediction", "cell",
+    "payloads",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -36,6 +37,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",
     "prediction": "the torque that another model predicts (--predicted)",
+    "payloads": "load_mass in every run of the axis, of two sizes at least",
     "cell": "a load channel or load_mass, or a motor_torque that the tension predicts",
 }
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""

@@ -48,6 +48,8 @@ _SPEEDS = 0.5, 0.12
 """m/s: a fast and a slow stroke, a factor of four apart, to separate viscous from Coulomb."""
 _MASSES = 15.0, 45.0
 """kg: a third and the whole load, to separate errors in proportion to the load."""
+_PAYLOAD = 5.0
+"""kg on an axis without a cable: that of a small robot's arm."""
 _WARM_FROM, _WARM_TO = 18.0, 26.0
 """Degrees Celsius: a morning in an unheated hall."""
 
@@ -65,6 +67,7 @@ def standard_motion() -> Motion:
         time=time,
         motor_angle=angle,
         load=mass * (GRAVITY - acceleration),
+        payload=_PAYLOAD,
         temperature=np.linspace(_WARM_FROM, _WARM_TO, len(time)),
     )
     torque = line.predict(line.motion(signals))["motor_torque"]

@@ -146,6 +146,8 @@ class Signals:
     motor_torque: Array | None = None
     predicted_torque: Array | None = None
     """Of another model, in place of the torque of the cable, N m."""
+    payload: float | None = None
+    """Mass that an axis without a cable carries, as the run states, kg."""
     rate_noise: float | None = None
     """Standard deviation of the noise of the motor's rate, rad/s; None: that of its derivatives."""
     clock: SamplingTimes | None = None
@@ -180,6 +182,8 @@ class At:
     """The drive's reading, else zero, N m."""
     predicted_torque: Array | None = None
     """At the motor by another model, in place of the torque of the cable, N m."""
+    payload: float | None = None
+    """Mass that an axis without a cable carries, as the run states, kg."""
     reads_cell: bool = False
     """Whether ``tension`` is the cell's reading, since no load is known."""
     pulley: int = -1

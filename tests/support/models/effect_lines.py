@@ -52,6 +52,7 @@ def standard_on(drum: str, **changed: object) -> tuple[Line, Motion]:
         at.time,
         at.motor_angle,
         load=standard_motion().load,
+        payload=at.payload,
         temperature=at.temperature,
         motor_torque=at.motor_torque,
     )

@@ -227,6 +227,7 @@ def _signals(run: Run, profile: WinchProfile, clock: SamplingTimes | None = None
         motor_angle=bridged(run["motor_angle"]),
         load=bridged_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
+        payload=None if has_cable else run.load_mass,
         tension=bridged_channel(run, "tension") if has_cable else None,
         temperature=bridged_channel(run, "temperature"),
         motor_velocity=bridged_channel(run, "motor_velocity"),

@@ -32,6 +32,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
     )
     turns_whole = not is_axis and _turns(dataset) >= 1
     cable_force = any(bool(r.raw.at.tension.any()) for r in recordings)
+    payloads = {r.raw.at.payload for r in recordings}
     # Without a cable force a winch's drum that never turns once is what a joint is.
     is_joint = set(dataset.outputs) == {"motor_torque"} and not cable_force and not turns_whole
     have = {
@@ -49,6 +50,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
         "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
+        "payloads": None not in payloads and len(payloads) > 1,
         "cell": any(r.raw.load is not None for r in recordings) or _tension_is_input(dataset),
     }
     lacking = [NEED_WORDS[need] for need in effect.needs if not have[need]]

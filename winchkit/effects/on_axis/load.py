@@ -1,4 +1,4 @@
-"""Torque of what an axis moves: weight of a part, spring."""
+"""Torque of what an axis moves: weight of a part, payload, spring."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
+from winchkit.units import GRAVITY
 
 
 def _joint_gravity(torque: Array, at: At, values: Values) -> Array:
@@ -32,6 +33,37 @@ JOINT_GRAVITY = Effect(
     told_apart="A stroke of at least a quarter turn: a short one is a straight line.",
     needs=("axis",),
     polar=("amplitude", "phase"),
+    order=-2,
+)
+
+
+def _joint_payload(torque: Array, at: At, values: Values) -> Array:
+    lever, gear = values["lever"], at.profile.gearbox
+    weight = GRAVITY * lever * np.sin(at.drum_angle + values["phase"])
+    slope = gear.direction / gear.ratio
+    return torque + (at.payload or 0.0) * slope * (
+        weight + lever**2 * slope * at.motor_acceleration
+    )
+
+
+JOINT_PAYLOAD = Effect(
+    id="joint-payload",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("lever", "m", null=0.0, typical=0.3, low=0.0, high=100.0),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+    ),
+    apply=_joint_payload,
+    outputs=("motor_torque",),
+    part="load",
+    what="The axis carries the load that a run states on a lever.",
+    formula="τ + m (g l sin(φ + p) + l² φ̈) / ratio, m the run's load_mass, φ the joint angle",
+    source="statics and inertia of a point mass on a pendulum",
+    looks_like="A sine of the joint angle in the torque, in proportion to the stated load.",
+    confused_with=("joint-gravity",),
+    told_apart="Runs with further loads, one of them without any.",
+    needs=("axis", "payloads"),
+    polar=("lever", "phase"),
     order=-2,
 )
 

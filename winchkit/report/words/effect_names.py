@@ -104,6 +104,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
     ),
     "guide-offset": ("offset of the cable guide", "the guide is mounted with an offset"),
     "joint-gravity": ("eccentric weight of the axis", "the axis carries an eccentric weight"),
+    "joint-payload": ("payload on the axis", "the stated load acts on a lever of the axis"),
     "layer-thickness": ("growth of the cable layers", "the growth of the cable layers is wrong"),
     "length-gain": (
         "gain of the length instrument",
