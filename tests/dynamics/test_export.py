@@ -94,9 +94,9 @@ wound_turns = 6.0
 """
 REFUSED = {
     "cable-elongation-quartic", "cell-lag", "drum-winding-tension", "length-time-offset",
-    "torque-lag", "torque-lead", "prediction-delay",
+    "torque-lag", "torque-lead", "prediction-delay", "joint-payload",
 }  # fmt: skip
-"""Effects of the catalogue whose function is none of one sample."""
+"""Effects of the catalogue whose function is none of one sample, or of the load of a run."""
 BETWEEN = {"cable-hysteresis", "cell-hysteresis", "pulley-inertia"}
 """Effects that use samples on both sides in a run, and differ from it by their step."""
 

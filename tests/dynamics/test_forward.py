@@ -110,6 +110,16 @@ def test_a_pendulum_with_dry_friction_is_that_of_scipy(tmp_path: Path, friction:
     )
 
 
+def test_a_payload_swings_on_its_lever_as_in_closed_form(tmp_path: Path) -> None:
+    profile = profile_of(tmp_path, AXIS, ("joint-payload", 'lever = "0.5 m"\nphase = "0 rad"'))
+    still = torque_run(np.zeros(1000), angle=1e-4)
+    run = forward(profile, torque=still, load_mass=MASS, initial_speed=0.0)
+    omega = np.sqrt(MASS * GRAVITY * 0.5 / (INERTIA + MASS * 0.5**2))
+    np.testing.assert_allclose(run["motor_angle"], 1e-4 * np.cos(omega * run.time), atol=1e-9)
+    with pytest.raises(UsageError, match="needs the load of every run"):
+        forward(profile, torque=still, initial_speed=0.0)
+
+
 def test_a_hanging_load_falls_with_the_inertia_of_the_rotor(tmp_path: Path) -> None:
     run = forward(profile_of(tmp_path, WINCH), torque=torque_run(np.zeros(50)),
                   load_mass=MASS, initial_speed=0.0)  # fmt: skip

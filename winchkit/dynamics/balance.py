@@ -117,7 +117,8 @@ def balance(
     *,
     is_load_known: bool = False,
 ) -> Balance:
-    """The balance of a profile with its effects, under a mass, kg, a known load, or none. Raises
+    """The balance of a profile with its effects, under a mass, kg, a known load, or none; a mass of
+    an axis is its payload. Raises
     UsageError with the names of effects that no step is known of, and for a profile without
     inertia."""
     acting = [t for t in terms if t.effect.stage in ON_MOTION and t.effect.undo is None]
@@ -129,6 +130,8 @@ def balance(
     opened = {n: symbol(s.open) * tracer.rates[n] for n, s in tracer.states.items()}
     length = expression(kinematics.free_length)
     load = signal("load") if is_load_known else number(0.0)
+    if isinstance(profile, AxisProfile):
+        at, load_mass = replace(at, payload=load_mass), None
     if load_mass is not None:
         falling = rate(rate(length, opened), opened)
         load = number(load_mass) * (number(GRAVITY) - falling)
@@ -190,7 +193,7 @@ def needs_a_step(profile: WinchProfile, term: Term) -> bool:
     rows = [traced([a, b]) for a, b in zip(early, late, strict=True)]
     at = replace(
         line.moments(*rows[:5]), motor_acceleration=rows[5], motor_direction=rows[6],
-        direction=rows[7], motor_torque=rows[8], pulley=0, wrap=1.0,
+        direction=rows[7], motor_torque=rows[8], payload=1.0, pulley=0, wrap=1.0,
     )  # fmt: skip
     line = Line(profile, modifiers_of([term]))
     try:

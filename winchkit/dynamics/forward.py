@@ -106,17 +106,21 @@ def forward(
         load_mass = positive("forward", "load_mass", load_mass)
     if initial_speed is not None:
         initial_speed = number("forward", "initial_speed", initial_speed)
-    if load_mass is not None and isinstance(profile, AxisProfile):
+    terms = terms_of(profile, catalogue)
+    if (
+        load_mass is not None
+        and isinstance(profile, AxisProfile)
+        and not any("payloads" in term.effect.needs for term in terms)
+    ):
         raise UsageError(
             f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
-            "would hang on it: leave the load out, or add its inertia to the effect rotor-inertia"
+            "would hang on it: leave the load out, or add the effect joint-payload"
         )
     sources = {"programme": programme, "torque": torque, "reference": reference}
     given = [name for name, source in sources.items() if source is not None]
     if len(given) != 1:
         had = " and ".join(given) or "none"
         raise UsageError(f"give one of a programme, a torque and a reference; there is {had}")
-    terms = terms_of(profile, catalogue)
     if programme is not None:
         setup = _of_programme(profile, terms, programme, load_mass, rate)
     else:
@@ -216,11 +220,9 @@ def setup_of(
     angle = profile.reference.motor_angle
     if "motor_angle" in run:
         angle = float(run["motor_angle"][0])
-    mass, signals = None, {}
-    if not isinstance(profile, AxisProfile):
-        mass = load_mass if load_mass is not None else run.load_mass
-        if mass is None and "load" in run:
-            signals["load"] = run["load"]
+    mass, signals = load_mass if load_mass is not None else run.load_mass, {}
+    if mass is None and "load" in run and not isinstance(profile, AxisProfile):
+        signals["load"] = run["load"]
     if is_torque:
         signals["torque"] = values
     else:

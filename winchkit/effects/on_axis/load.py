@@ -6,6 +6,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.errors import UsageError
 from winchkit.model.stages import At, Stage
 from winchkit.units import GRAVITY
 
@@ -39,11 +40,15 @@ JOINT_GRAVITY = Effect(
 
 def _joint_payload(torque: Array, at: At, values: Values) -> Array:
     lever, gear = values["lever"], at.profile.gearbox
+    if not lever:
+        return torque
+    if at.payload is None:
+        raise UsageError(
+            "effect 'joint-payload' needs the load of every run: state load_mass, 0 kg for none"
+        )
     weight = GRAVITY * lever * np.sin(at.drum_angle + values["phase"])
     slope = gear.direction / gear.ratio
-    return torque + (at.payload or 0.0) * slope * (
-        weight + lever**2 * slope * at.motor_acceleration
-    )
+    return torque + at.payload * slope * (weight + lever**2 * slope * at.motor_acceleration)
 
 
 JOINT_PAYLOAD = Effect(
