@@ -257,7 +257,8 @@ MOVES = [
     e
     for e in load_catalogue().of_winches()
     if e.stage in ON_MOTION
-    and e.id != "prediction-delay"  # of a recorded column: none is simulated
+    # Of a recorded column, none is simulated; of an axis, it swings above.
+    and e.id not in {"prediction-delay", "joint-payload"}
 ]
 
 

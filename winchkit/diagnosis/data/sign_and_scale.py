@@ -344,6 +344,7 @@ def _signals(run: Run, profile: WinchProfile) -> Signals:
         motor_angle=bridged(run["motor_angle"]),
         load=bridged_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
+        payload=None if has_cable else run.load_mass,
         tension=bridged_channel(run, "tension") if has_cable else None,
         predicted_torque=bridged_channel(run, "predicted_torque"),
     )

@@ -100,7 +100,7 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     there = np.arange(_FINER * (count - 1) + 1) / _FINER
     between = interpolated
     time, angle = np.interp(there, here, signals.time), between(signals.motor_angle)
-    finer = line.motion(Signals(time, angle, rate_noise=clock.rate_noise))
+    finer = line.motion(Signals(time, angle, payload=signals.payload, rate_noise=clock.rate_noise))
     at = replace(
         finer.at,
         tension=between(smooth.at.tension + _force_correction(recording, line)),
