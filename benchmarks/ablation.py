@@ -85,11 +85,8 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "predictable residual": {"diagnose.predictable_share": lambda *_: 0.0},
     "pairs": {"selection.stepwise._best_pair": _nothing},
     "exchange for a pair": {"selection.stepwise.pair_exchange": _second},
-    "exchange": {"selection.stepwise._exchanged_terms": _second},
     "minor terms": {"selection.stepwise._without_minor_terms": lambda _, p, noise: (p, noise)},
     "rest imitated": {"selection.stepwise._imitates_rest": _no},
-    "other grid point": {"selection.stepwise.other_grid_point": _no},
-    "explained by initial states": {"selection.engine.explained_by_initial_states": _no},
     "truncated series": {"selection.engine.truncated_series": lambda effect: (effect,)},
     "shape at its bound": {"selection.engine.shape_at_bound": _no},
     "discretisation in the lack of fit": {

@@ -11,7 +11,6 @@ from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_cha
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.selection.starting_values import (
-    other_grid_point,
     shape_at_bound,
     truncated_series,
 )
@@ -44,17 +43,6 @@ def test_a_shape_at_its_bound_is_rejected() -> None:
     inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
     assert not shape_at_bound(inside)
     assert shape_at_bound(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))
-
-
-def test_times_and_orders_have_other_minima_and_time_constants_do_not() -> None:
-    slip = term("encoder-slip", step=0.01, time=33.5)
-    assert other_grid_point(slip, {"time": 30.0})
-    assert other_grid_point(
-        term("motor-cogging", amplitude=0.01, phase=0.0, order=4.0), {"order": 6.0}
-    )
-    assert not other_grid_point(slip, {"time": 33.5})
-    creep = term("cable-creep", creep_stiffness=1e6, time_constant=33.5)
-    assert not other_grid_point(creep, {"time_constant": 60.0})
 
 
 RIDE = Ride(samples=1600, rate=25.0, period=64.0)  # so slow that the tension hardly changes

@@ -22,7 +22,6 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.selection.admissible import admissible, best_of_each
-from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
 from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
 from winchkit.diagnosis.selection.scores import Projected, Score, score
 from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
@@ -328,9 +327,7 @@ class SelectionEngine(ABC):
                 )
             if not all_starts:
                 self._optima[key] = fitted.hypothesis
-            longer = FittedCandidate(
-                fitted, self._criterion_of_trial(fitted, hypothesis, present, noise)
-            )
+            longer = FittedCandidate(fitted, self._criterion_of_trial(fitted))
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
@@ -362,34 +359,11 @@ class SelectionEngine(ABC):
         terms = [Term(item.candidate.effect, values) for values in starting_values(item)]
         return [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
 
-    def _criterion_of_trial(
-        self, fitted: Fit, without: Hypothesis, present: Fit, noise: BandNoise
-    ) -> float:
+    def _criterion_of_trial(self, fitted: Fit) -> float:
         """Criterion of a trial; infinite where its last effect has degenerated to another."""
-        criterion = self.criterion(fitted)
-        if fitted.abandoned:
-            return criterion
-        if shape_at_bound(fitted.hypothesis.terms[-1]) or (
-            criterion < self.criterion(present)
-            and self._explained_by_initial_states(without, fitted, noise)
-        ):
-            criterion = np.inf
-        return float(criterion)
-
-    def _explained_by_initial_states(
-        self, without: Hypothesis, fitted: Fit, noise: BandNoise
-    ) -> bool:
-        """Whether the last effect explains mainly by its initial states."""
-        if not fitted.hypothesis.starts[-1]:
-            return False
-        inverse_sigma = noise.inverse_sigma(self.regression)
-        return explained_by_initial_states(
-            self.regression,
-            self.refit(without, noise),
-            fitted,
-            inverse_sigma,
-            self.penalty_per_parameter,
-        )
+        if not fitted.abandoned and shape_at_bound(fitted.hypothesis.terms[-1]):
+            return np.inf
+        return self.criterion(fitted)
 
     def refit(self, hypothesis: Hypothesis, noise: BandNoise, aim: float = np.inf) -> Fit:
         """Fit a hypothesis under a given noise, from the last values of the same effects where

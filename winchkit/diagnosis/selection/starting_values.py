@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -40,14 +39,6 @@ def truncated_series(effect: Effect) -> list[Effect]:
         probes = tuple(probe for probe in longer.probes if last.name not in probe)
         out.insert(0, replace(longer, parameters=parameters, probes=probes))
     return out
-
-
-def other_grid_point(term: Term, shape: Mapping[str, float]) -> bool:
-    """Whether a grid point is another local minimum than the fitted values, as for an order, or for
-    the time of an event, which has a minimum in every hold.
-    """
-    grids = [p for p in term.effect.parameters if p.name in shape and p.grid]
-    return any(shape[p.name] != term.values[p.name] for p in grids if p.whole or p.onset)
 
 
 def starting_values(item: Score) -> list[dict[str, float]]:

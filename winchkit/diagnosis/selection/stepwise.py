@@ -1,8 +1,8 @@
-"""Stepwise selection of effects: forward selection, exchange and backward elimination.
+"""Stepwise selection of effects: forward selection, backward elimination, pairs.
 
 Each step takes the candidate with the best criterion among the five with the largest scores, if
-it is accepted by cross-validation; the larger model is refitted, effects are exchanged for better
-rivals and dropped where the criterion decreases without them.
+it is accepted by cross-validation; the larger model is refitted, and effects are dropped where the
+criterion decreases without them.
 
 References
 ----------
@@ -24,18 +24,14 @@ from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import BandNoise
-from winchkit.diagnosis.selection.acceptance import MIN_GAIN, best_accepted, is_accepted
+from winchkit.diagnosis.selection.acceptance import best_accepted, is_accepted
 from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.scores import Score, null_maxima
-from winchkit.diagnosis.selection.starting_values import other_grid_point
-from winchkit.effects.term import Term
 
 _SHORT_LIST = 5
 """Candidates that are fitted per step; computing cost; measured: the accepted
 candidate was the first by score in 15 of 17 steps, else the second."""
-_RIVALS = 2
-"""Rivals that are fitted in the place of each addition; computing cost, rule of thumb."""
 _RECONSIDERED = 3
 """Rounds of backward elimination and exchange per step; computing cost, rule of thumb."""
 _EXCHANGED = 2
@@ -281,46 +277,16 @@ def _exchange_and_eliminate(
     engine: SelectionEngine, present: Fit, noise: BandNoise
 ) -> tuple[Fit, BandNoise]:
     """Exchange and eliminate effects until the model does not change: the first of two may have
-    explained both, and its best rival is found only beside the second.
+    explained both.
     """
     for _ in range(_RECONSIDERED):
         before = present.labels
-        present = _exchanged_terms(engine, _backward_elimination(engine, present, noise), noise)
+        present = _backward_elimination(engine, present, noise)
         present = pair_exchange(engine, present, noise, 2)
         present = _backward_elimination(engine, present, noise)
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
     return engine.fit_with_noise(present.hypothesis, noise)
-
-
-def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit:
-    """Model with every addition exchanged for its best rival, where that fits better."""
-    for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
-        if index >= len(present.hypothesis.terms):
-            break  # A rival replaced two effects.
-        own = present.hypothesis.terms[index]
-        base = _without(engine, present, noise, index)
-        rivals = _rivals_of(own, engine.scores(base, noise))
-        trials = [engine.trial(base, item, noise, target=present.chi_square) for item in rivals]
-        best = min(trials, key=lambda t: t.criterion, default=None)
-        if best is not None and best.criterion < engine.criterion(present) - MIN_GAIN:
-            present = best.fit
-    return present
-
-
-def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
-    """The two best candidates for a term's place, and the simpler laws that they contain, whose
-    scores before the fit are always smaller.
-    """
-    others = [item for item in scores if item.net_gain > 0 and _another(item, own)]
-    best = others[:_RIVALS]
-    simpler = {name for item in best for name in item.candidate.effect.contains}
-    return best + [item for item in others[_RIVALS:] if item.candidate.effect.id in simpler]
-
-
-def _another(item: Score, own: Term) -> bool:
-    """Whether a candidate is another effect than a term, or the same at another minimum."""
-    return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
 
 
 def _without_minor_terms(
