@@ -28,8 +28,7 @@ STOPPED = "a stop came while bench 'rig' was being opened: nothing was moved"
 
 
 @pytest.mark.parametrize("after", [0.0, 0.2, 0.35])
-def test_an_opening_ends_and_the_next_one_is_free(tmp_path: Path, after: float) -> None:
-    rig = Rig(tmp_path)
+def test_an_opening_ends_and_the_next_one_is_free(rig: Rig, after: float) -> None:
     rig.write_bench(bench_text(rig.channel))
     spec = read_bench(rig.bench_file)
     begun = rig.time

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_files import invoke
+from command_line import invoke
 from winchkit import add, read_profile, write_run
 from winchkit.dynamics import refit
 from winchkit.dynamics.comparison import simulated_errors

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from winchkit.cli import main
+from command_line import invoke
 from winchkit.effects import Effect, load_catalogue
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.user_effects import broken_promises
@@ -97,6 +96,6 @@ def test_what_breaks_them_is_reported_with_its_file(
 
 def test_a_command_ends_with_a_bad_file(tmp_path: Path) -> None:
     file = written(tmp_path, "value + 1")
-    done = CliRunner().invoke(main, ["effects", "mine", "--effects", str(file)])
+    done = invoke("effects", "mine", "--effects", file)
     assert done.exit_code == 3
     assert "at its null" in done.stderr

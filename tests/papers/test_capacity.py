@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.cli import main
+from command_line import invoke
 from winchkit.errors import FileError
 from winchkit.model.capacity import (
     capacity,
@@ -153,7 +153,7 @@ length = ["0.2 m", "7 m"]
 
 
 def check(*arguments: object) -> Result:
-    return CliRunner().invoke(main, ["check", *map(str, arguments)])
+    return invoke("check", *arguments)
 
 
 def test_check_reports_the_safe_stroke(tmp_path: Path) -> None:

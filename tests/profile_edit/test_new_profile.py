@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
+from command_line import invoke
 from winchkit import find
-from winchkit.cli import main
 from winchkit.errors import UsageError
 from winchkit.profile_edit.drawing import DRUMS, FIELDS
 from winchkit.profile_edit.new_profile import new_profile
@@ -96,7 +95,7 @@ def test_the_terminal_asks_until_the_answer_can_be_read(
     answers = ["grooved", "60", "60 mm", "5 mm", "", "20.4", *[""] * 9, "4 m", "", "40 mm", ""]
     target = tmp_path / "asked.toml"
     typed = "\n".join([*answers, ""])
-    found = CliRunner().invoke(main, ["profile", "new", str(target)], input=typed)
+    found = invoke("profile", "new", target, input=typed)
     assert found.exit_code == 0, found.output
     assert "'60' has no unit" in found.output
     own = read_profile(target)

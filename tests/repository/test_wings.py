@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
-from click.testing import CliRunner
 
+from command_line import invoke
 from snippets import ROOT
 from winchkit import wings
 from winchkit.cli import main
@@ -107,10 +107,10 @@ def test_another_distribution_adds_a_kind_of_profile_and_a_command(tmp_path: Pat
     assert declared == _Crane(12.0)
     assert wings.call("compare", declared) is len
     assert wings.call("diagnose", declared) is None
-    assert CliRunner().invoke(main, ["slew", "--help"]).exit_code == 0
+    assert invoke("slew", "--help").exit_code == 0
     assert "slew" not in main.table
 
 
 def test_a_command_that_no_wing_has_is_refused() -> None:
-    found = CliRunner().invoke(main, ["slew"])
+    found = invoke("slew")
     assert found.exit_code == 2

@@ -5,12 +5,12 @@ from __future__ import annotations
 import textwrap
 from pathlib import Path
 
+import pytest
+
 from declared import BENCH, faults_of
 
-
-def test_faults_of_a_programme(file: Path) -> None:
-    faults = faults_of(
-        file,
+CASES: dict[str, tuple[str, list[tuple[int, str]]]] = {
+    "programme": (
         """\
         schema = 1
         kind = "programme"
@@ -29,26 +29,21 @@ def test_faults_of_a_programme(file: Path) -> None:
         [[step]]
         wait = "5 s"
         """,
-    )
-    assert [(line, key) for line, key, _ in faults] == [
-        (3, "repeat"),
-        (4, "step[1].speed"),
-        (6, "step[2]"),
-        (11, "step[3].speed"),
-        (14, "step[4].load_mass"),
-        (15, "step[5]"),
-        (16, "step[5].wait"),
-    ]
-
-
-def test_a_programme_without_steps(file: Path) -> None:
-    faults = faults_of(file, 'schema = 1\nkind = "programme"\nstep = []\n')
-    assert [(line, key) for line, key, _ in faults] == [(3, "step")]
-
-
-def test_faults_of_a_robot(file: Path) -> None:
-    faults = faults_of(
-        file,
+        [
+            (3, "repeat"),
+            (4, "step[1].speed"),
+            (6, "step[2]"),
+            (11, "step[3].speed"),
+            (14, "step[4].load_mass"),
+            (15, "step[5]"),
+            (16, "step[5].wait"),
+        ],
+    ),
+    "programme without steps": (
+        'schema = 1\nkind = "programme"\nstep = []\n',
+        [(3, "step")],
+    ),
+    "robot": (
         """\
         schema = 1
         kind = "robot"
@@ -75,30 +70,19 @@ def test_faults_of_a_robot(file: Path) -> None:
         anchor_point = ["0 m", "0 m", "0 m"]
         winch = "nowhere"
         """,
-    )
-    assert [(line, key) for line, key, _ in faults] == [
-        (4, "home.position[3]"),
-        (7, "prior.winding_radius.bounds"),
-        (8, "prior.bend"),
-        (13, "line[1].swivel_axis"),
-        (14, "line[1].winch.drum.groove_pitch"),
-        (24, "line[2].winch"),
-    ]
-
-
-def test_two_lines_of_one_name(file: Path) -> None:
-    winch = 'winch = { drum = { kind = "squared", winding_radius = "60 mm", build_up = "0 mm" }, '
-    winch += "gearbox = { ratio = 1 }, reference = {} }\n"
-    line = '[[line]]\nname = "1"\nexit_point = ["0 m", "0 m", "0 m"]\n'
-    line += 'anchor_point = ["0 m", "0 m", "0 m"]\n' + winch
-    head = 'schema = 1\nkind = "robot"\nhome.position = ["0 m", "0 m", "0 m"]\n'
-    faults = faults_of(file, head + line + line)
-    assert faults == [(4, "line", "2 lines are named '1'")]
-
-
-def test_faults_of_a_simulated_bench(bench: Path) -> None:
-    text = BENCH.replace('"bench"', '"sim-bench"') + textwrap.dedent(
-        """\
+        [
+            (4, "home.position[3]"),
+            (7, "prior.winding_radius.bounds"),
+            (8, "prior.bend"),
+            (13, "line[1].swivel_axis"),
+            (14, "line[1].winch.drum.groove_pitch"),
+            (24, "line[2].winch"),
+        ],
+    ),
+    "simulated bench": (
+        BENCH.replace('"bench"', '"sim-bench"')
+        + textwrap.dedent(
+            """\
         [winch.A.truth]
         drum.winding_radius = "60.4 kg"
         drum.winding_radios = "60.4 mm"
@@ -112,22 +96,18 @@ def test_faults_of_a_simulated_bench(bench: Path) -> None:
         time = "1 s"
         kind = "silence"
         """
-    )
-    faults = faults_of(bench, text)
-    assert [(line, key) for line, key, _ in faults] == [
-        (17, "winch.A.truth.drum.winding_radius"),
-        (18, "winch.A.truth.drum.winding_radios"),
-        (19, "winch.A.truth.load_mass"),
-        (20, "winch.A.hidden[1].physics"),
-        (23, "noise.tension"),
-        (24, "noise.colour"),
-        (25, "fault[1].target"),
-    ]
-
-
-def test_faults_of_a_device(file: Path) -> None:
-    faults = faults_of(
-        file,
+        ),
+        [
+            (17, "winch.A.truth.drum.winding_radius"),
+            (18, "winch.A.truth.drum.winding_radios"),
+            (19, "winch.A.truth.load_mass"),
+            (20, "winch.A.hidden[1].physics"),
+            (23, "noise.tension"),
+            (24, "noise.colour"),
+            (25, "fault[1].target"),
+        ],
+    ),
+    "device": (
         """\
         schema = 1
         kind = "device"
@@ -147,13 +127,30 @@ def test_faults_of_a_device(file: Path) -> None:
         type = "u32"
         sign_bit = 3
         """,
-    )
-    assert [(line, key) for line, key, _ in faults] == [
-        (7, "trust"),
-        (8, "modbus.status_register"),
-        (9, "modbus.value"),
-        (13, "modbus.field"),
-    ]
+        [
+            (7, "trust"),
+            (8, "modbus.status_register"),
+            (9, "modbus.value"),
+            (13, "modbus.field"),
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_every_fault_has_its_line_and_its_key(bench: Path, kind: str) -> None:
+    text, places = CASES[kind]
+    assert [(line, key) for line, key, _ in faults_of(bench, text)] == places
+
+
+def test_two_lines_of_one_name(file: Path) -> None:
+    winch = 'winch = { drum = { kind = "squared", winding_radius = "60 mm", build_up = "0 mm" }, '
+    winch += "gearbox = { ratio = 1 }, reference = {} }\n"
+    line = '[[line]]\nname = "1"\nexit_point = ["0 m", "0 m", "0 m"]\n'
+    line += 'anchor_point = ["0 m", "0 m", "0 m"]\n' + winch
+    head = 'schema = 1\nkind = "robot"\nhome.position = ["0 m", "0 m", "0 m"]\n'
+    faults = faults_of(file, head + line + line)
+    assert faults == [(4, "line", "2 lines are named '1'")]
 
 
 def test_a_device_is_of_one_kind(file: Path) -> None:

@@ -16,10 +16,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
 from winchkit import catalog
-from winchkit.cli import main
 from winchkit.errors import Fault, one_line, printable
 from winchkit.runs import open_writer
 from winchkit.runs.formats.mcap_file import COLUMNS, METADATA, PROFILE, McapFile
@@ -30,10 +30,6 @@ CELL = EVIL.replace("\r", "")
 """As a name of a column, which has no line breaks."""
 STEERING = ("\x1b", "\x07", "\r", "\u202e", "\x9b", "\x7f", "\x08", "\u2028")
 PROFILE_FILE = "bench-spiral"
-
-
-def run(*words: object) -> Result:
-    return CliRunner().invoke(main, list(map(str, words)))
 
 
 @contextlib.contextmanager
@@ -118,7 +114,7 @@ def test_nothing_that_a_file_says_steers_the_terminal(tmp_path: Path) -> None:
     ]
     shown = ""
     for words in commands:
-        result = run(*words)
+        result = invoke(*words)
         assert_steers_nothing(result)
         shown += result.stdout + result.stderr
     assert "\\x1b]0;owned\\x07\\x1b[2J\\x1b[31m\\r\\u202egpj\\x9b2Kend" in shown, (
@@ -129,7 +125,7 @@ def test_nothing_that_a_file_says_steers_the_terminal(tmp_path: Path) -> None:
 
 def test_json_has_the_text_and_steers_nothing(tmp_path: Path) -> None:
     for words in (("log", "info", evil_csv(tmp_path)), ("check", evil_profile(tmp_path))):
-        result = run(*words, "--json")
+        result = invoke(*words, "--json")
         assert_steers_nothing(result)
         found = json.loads(result.stdout)
         told = found["metadata"]["note"] if "metadata" in found else found["files"][0]["name"]
@@ -236,7 +232,7 @@ def test_what_is_no_regular_file_is_refused_and_not_waited_for(
             writer.append_values([n * 0.01, n])
     special(kind, tmp_path / next(word for word in words if word.startswith("a.")))
     with not_longer_than(30):
-        result = run(*words)
+        result = invoke(*words)
     assert result.exit_code == 3, (result.exit_code, result.stdout, result.stderr)
     named = ("directory", "is a folder") if kind == "directory" else (kind,)
     assert any(words in result.stderr for words in named), result.stderr
@@ -267,7 +263,7 @@ def test_numbers_that_no_measurement_gives_are_faults_of_the_file(
         "compare": ("-p", PROFILE_FILE),
         "log replay": ("--fast", "--jsonl"),
     }
-    result = run(*command.split(), path, *more.get(command, ()))
+    result = invoke(*command.split(), path, *more.get(command, ()))
     assert result.exit_code == 3, result.stderr
     assert part in result.stderr
     assert f"{path}:32: " in result.stderr
@@ -303,12 +299,12 @@ def trap(tmp_path: Path) -> tuple[Path, Path]:
 def test_check_executes_nothing_that_a_file_names(trap: tuple[Path, Path]) -> None:
     bench, marker = trap
     for words in (("check", bench), ("check", "--json", bench)):
-        result = run(*words)
+        result = invoke(*words)
         assert not marker.exists()
         assert "mine.py' is Python code, which check does not execute" in result.stderr
         assert "no effect 'my-own'" not in result.stderr, "it may stand in that file"
     own = bench.with_name("mine.py")
-    result = run("check", bench, "--effects", own)
+    result = invoke("check", bench, "--effects", own)
     assert marker.exists(), "--effects is the user's own word"
     assert "has no object of class winchkit.effects.effect.Effect" in result.stderr
     assert "does not execute" not in result.stderr
@@ -324,7 +320,7 @@ def test_commands_that_only_read_execute_nothing(trap: tuple[Path, Path]) -> Non
         ("ledger", "-p", bench.with_name("mine.toml")),
         ("log", "info", bench),
     ):
-        run(*words)
+        invoke(*words)
         assert not marker.exists(), words
 
 

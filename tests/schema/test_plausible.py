@@ -7,10 +7,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
 from declared import BENCH, WINCH
-from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.read import read_bench, read_device
@@ -31,7 +31,7 @@ LIMITED = BENCH.replace(
 
 def checked(path: Path, text: str) -> Result:
     path.write_text(text)
-    return CliRunner().invoke(main, ["check", str(path)])
+    return invoke("check", path)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_bench_without_length_or_tension_limits_is_warned_of(bench: Path) -> N
     assert len(kept) == 2
     limited = checked(bench, LIMITED)
     assert "limits: there" not in limited.stderr
-    entry = json.loads(CliRunner().invoke(main, ["check", "--json", str(bench)]).stdout)
+    entry = json.loads(invoke("check", "--json", bench).stdout)
     assert not [one for one in entry["files"][0]["warnings"] if "limit" in one["message"]]
 
 
@@ -149,7 +149,7 @@ def test_a_command_value_that_is_no_register_is_refused(
 def test_a_command_line_refuses_sizes_without_sense(bench: Path, words: tuple[str, ...]) -> None:
     bench.write_text(LIMITED)
     named = [] if words[0] == "sim" else ["--bench", str(bench)]
-    result = CliRunner().invoke(main, [*words, *named])
+    result = invoke(*words, *named)
     assert not isinstance(result.exception, OverflowError | ValueError), result.exception
     if isinstance(result.exception, SystemExit):
         assert result.exit_code == UsageError.exit_code, result.output

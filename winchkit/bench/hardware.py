@@ -86,7 +86,7 @@ class Wired:
         for name, axis in self.axes.items():
             if self.loop.winches[name].controller.phase is Phase.DISABLED:
                 with suppress(ConnectionLost):
-                    axis.disarm()
+                    axis.host.disarm()
 
 
 def wire(
@@ -126,7 +126,7 @@ def wire(
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
     for name, axis in axes.items():
-        axis.recall_position(positions.found.get(name))
+        axis.position.recall(positions.found.get(name))
     _commission(axes, clock, tell)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)

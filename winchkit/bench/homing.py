@@ -54,7 +54,7 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
             zero = winch.snapshot.motor_angle
         if asked.at is not None:
             yield from _define(bench, winch, winch.motor_angle_at(asked.at) + zero)
-        axis.note_zero()
+        axis.position.note_zero()
     except (MotionError, NoReply, DeviceRefused):
         winch.raise_trouble()  # the cause, where something has tripped
         raise
@@ -137,7 +137,7 @@ def _run(
     bench.wait_at_rest((winch.name,))
     if motion.failure:
         raise DriveFault(f"winch {winch.name}: homing failed: {motion.failure} ({axis.fault_text})")
-    axis.note_zero(_UNFINISHED)
+    axis.position.note_zero(_UNFINISHED)
 
 
 def _prepare(axis: Cia402Axis, specs: list[HomingSpec]) -> None:

@@ -182,8 +182,8 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     cleared = [str(trip) for trip in seen.tripped]
     for name, axis in axes.items():
         # What somebody else commands during the reset keeps it from succeeding.
-        axis.forget_second_master()
-        axis.forget_position_jump()
+        axis.second_master.forget()
+        axis.position.forget_jump()
         loop.winches[name].rested.forget()
     found = _ResetFindings(
         unheard=frozenset(t.winch for t in (*seen.tripped, *seen.blocked) if t.kind in _UNHEARD),
@@ -218,7 +218,7 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     ]
     clear_faults(loop, clock)
     for axis in axes.values():
-        axis.forget_alarms()
+        axis.emergencies.in_force.clear()
     boot_ups = {name: axis.heartbeat.boot_ups for name, axis in axes.items()}
     meanwhile = [t for t in loop.supervisor.acknowledge(boot_ups) if t not in seen.tripped]
     cleared += [

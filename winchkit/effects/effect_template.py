@@ -11,6 +11,7 @@ from winchkit.effects.empirical import heights, knots, variable_of
 from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
+from winchkit.regular_file import file_errors
 
 HEAD = '''"""{id}: residual of the {output} over the {variable}; its physics is to be filled in.
 
@@ -173,13 +174,12 @@ def write_wave_on_drum(order: int, effect_id: str, path: Path) -> None:
 
 
 def _write(text: str, path: Path) -> None:
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise FileError(Fault(_THERE, str(path))) from error
-    except OSError as error:
-        raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
+    with file_errors(path):
+        try:
+            with path.open("x", encoding="utf-8") as file:
+                file.write(text)
+        except FileExistsError as error:
+            raise FileError(Fault(_THERE, str(path))) from error
 
 
 def _wave(effect: Effect, values: Mapping[str, float]) -> tuple[str, dict[str, object]]:

@@ -45,14 +45,14 @@ def ladder(profile: WinchProfile | RobotProfile) -> tuple[HistoryStep, ...]:
 
     Returns
     -------
-    tuple[Rung, ...]
+    tuple of HistoryStep
         Held-out errors per step, SI.
     """
     require_type(profile, (WinchProfile, RobotProfile), "profile")
-    return tuple(_rung(entry) for entry in profile.ledger)
+    return tuple(_step(entry) for entry in profile.ledger)
 
 
-def _rung(entry: LedgerEntry) -> HistoryStep:
+def _step(entry: LedgerEntry) -> HistoryStep:
     before, after, noise = (_si(entry, name) for name in ("before", "after", "noise"))
     return HistoryStep(entry.did, entry.effect, entry.date, entry.runs, before, after, noise)
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
+from command_line import done
 from served import Served
-from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.read import read_bench, read_tares
@@ -26,36 +25,30 @@ def bench(cell: Served, tmp_path: Path) -> Path:
     return path
 
 
-def run(*words: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [*map(str, words)])
-    assert result.exit_code == code, result.output
-    return result
-
-
 def test_it_is_read_and_tared(bench: Path) -> None:
-    assert "ok (bench 'cells')" in run("check", bench).output
-    assert "laumas-tlb" in run("cell", "info", "-b", bench).output
-    run("cell", "tare", "-b", bench)
+    assert "ok (bench 'cells')" in done("check", bench).output
+    assert "laumas-tlb" in done("cell", "info", "-b", bench).output
+    done("cell", "tare", "-b", bench)
     assert read_tares(bench.with_name("cells.tares.toml")).tare["A.cell"].value == pytest.approx(
         100, abs=2
     )
-    run("cell", "tare", "--clear", "-b", bench)
-    told = run("tare", "A", "-b", bench).output
+    done("cell", "tare", "--clear", "-b", bench)
+    told = done("tare", "A", "-b", bench).output
     assert abs(float(told.split("reads ")[1].split(" N")[0])) < 2
 
 
 @pytest.mark.parametrize("suffix", [".mcap", ".csv"])
 def test_its_log_is_a_run_of_the_cell(bench: Path, suffix: str) -> None:
     file = bench.with_name(f"rest{suffix}")
-    run("log", "-b", bench, "-o", file, "--for", "1s")
+    done("log", "-b", bench, "-o", file, "--for", "1s")
     found = read_run(file)
     assert set(found) == {"tension", "tension_gross"}
     assert found["tension"].mean() == pytest.approx(100, abs=2)
     assert len(found) > 20
-    assert "/drive" not in run("log", "info", file).output
-    assert "noise" in run("cell", "diagnose", "--run", file).output
+    assert "/drive" not in done("log", "info", file).output
+    assert "noise" in done("cell", "diagnose", "--run", file).output
     for command in ("compare", "diagnose"):
-        assert "motor_angle" in run(command, file, "-p", "bench-spiral", code=3).output
+        assert "motor_angle" in done(command, file, "-p", "bench-spiral", code=3).output
 
 
 @pytest.mark.parametrize(
@@ -73,7 +66,7 @@ def test_its_log_is_a_run_of_the_cell(bench: Path, suffix: str) -> None:
 def test_what_needs_a_drive_is_refused_with_what_there_is(
     bench: Path, words: tuple[str, ...]
 ) -> None:
-    told = run(*words, "-b", bench, code=2).output
+    told = done(*words, "-b", bench, code=2).output
     assert "instruments" in told
 
 

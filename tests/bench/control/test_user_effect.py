@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
+from command_line import invoke
 from fake_axis import Rig
 from winchkit import open_bench
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import PlannedMove
 from winchkit.bench.control.snapshot import Phase
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.effects import load_catalogue, terms_of
 from winchkit.errors import FileError
 from winchkit.estimation.cable_state import CableEstimator, Sample
@@ -72,10 +71,6 @@ def bench_file(folder: Path, profile: Path, line: str = "") -> Path:
     path = write_bench(replace(SPIRAL.bench, winch={"A": wired}), folder / "bench.toml")
     path.write_text(f"{line}\n{path.read_text()}")
     return path
-
-
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 def rope_now(folder: Path, effects: str) -> CableEstimator:

@@ -36,12 +36,12 @@ def parts(*, faulty: bool) -> Any:
         mode_kept="mode kept",
         fault_text="fault text",
         nmt_text="NMT text",
-        second_master="second master",
+        second_master=Made(heard="second master"),
         position_doubt="",
         position_jump="position jump",
-        position_disagreement="disagreement",
+        position=Made(disagreement="disagreement"),
         alarms=(0x4210,),
-        alarm_text="alarm text",
+        emergencies=Made(standing="alarm text"),
     )
     controller = Made(
         phase=Phase.DISABLED if faulty else Phase.MOVING,

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
+from command_line import invoke
 from fed import Fed, recording
 from winchkit.bench.recording.recorder import Recorder
-from winchkit.cli import main
 from winchkit.runs import read_run, write_run
 from winchkit.runs.read import read_log
 from winchkit.runs.recording.rotation import Rotation
@@ -80,10 +79,10 @@ def test_a_change_of_the_tare_during_a_log_is_an_event(tmp_path: Path) -> None:
     log = read_log(path)
     changed = next(note.time for note in log.events if note.value["tare"]["A.cell"] == OF_HOST)
     assert changed - begin == pytest.approx(1.0, abs=0.1)
-    told = CliRunner().invoke(main, ["log", "info", str(path)]).stdout
+    told = invoke("log", "info", path).stdout
     assert "tare of A.cell: 0 N of the host" in told
     assert "tare of A.cell from 1.0" in told
-    found = json.loads(CliRunner().invoke(main, ["log", "info", str(path), "--json"]).stdout)
+    found = json.loads(invoke("log", "info", path, "--json").stdout)
     assert len([text for text in found["tares"] if text.startswith("A.cell")]) == 3
 
 

@@ -229,9 +229,8 @@ def test_no_drive_is_enabled_without_a_key_that_is_down(
             assert not bench.snapshot.tripped
 
 
-def test_the_keyboard_of_this_test_moves_the_winch(tmp_path: Path) -> None:
+def test_the_keyboard_of_this_test_moves_the_winch(rig: Rig) -> None:
     """Else nothing above could fail."""
-    rig = Rig(tmp_path)
     keyboard = Keyboard(rig)
     with rig.opened() as bench:
         world = World(rig, bench, keyboard, [], rig.time + 3.0)
@@ -248,8 +247,7 @@ def test_the_keyboard_of_this_test_moves_the_winch(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("order", ["jog", "hold"])
-def test_a_loop_that_stood_still_ends_and_moves_nothing(tmp_path: Path, order: str) -> None:
-    rig = Rig(tmp_path)
+def test_a_loop_that_stood_still_ends_and_moves_nothing(rig: Rig, order: str) -> None:
     with rig.opened() as bench:
         station = LocalStation(bench, Client("jog"))
         station.jog("A", pay_out=0.1)
@@ -284,8 +282,7 @@ def test_a_loop_that_stood_still_ends_and_moves_nothing(tmp_path: Path, order: s
         assert rig.slaves[0].motor.velocity != 0.0, "a new command moves it"
 
 
-def test_a_homing_that_was_led_too_late_goes_on_to_no_further_motion(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_homing_that_was_led_too_late_goes_on_to_no_further_motion(rig: Rig) -> None:
     with rig.opened() as bench:
         station = LocalStation(bench, Client("home"))
         station.home("A", None, 2.0, None)

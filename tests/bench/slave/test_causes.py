@@ -42,9 +42,8 @@ def test_a_reversed_motor_is_called_one(tmp_path: Path, factor: float) -> None:
     ],
 )
 def test_a_motion_that_is_missing_is_called_what_it_is(
-    tmp_path: Path, fault: str, value: float, said: str
+    rig: Rig, fault: str, value: float, said: str
 ) -> None:
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         key = HeldKey(rig, bench, pay_out=0.02).press()
         rig.wait(1.5)

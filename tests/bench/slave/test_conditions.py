@@ -166,8 +166,7 @@ def test_every_condition_on_the_bench_has_a_case() -> None:
 
 
 @pytest.mark.parametrize("change", ["removed", "replaced"])
-def test_a_trip_is_kept_although_the_latch_file_was_changed(tmp_path: Path, change: str) -> None:
-    rig = Rig(tmp_path)
+def test_a_trip_is_kept_although_the_latch_file_was_changed(rig: Rig, change: str) -> None:
     bench = rig.open()
     path = Path(bench.spec.latch_file)
     if change == "removed":

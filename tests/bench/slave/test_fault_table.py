@@ -139,8 +139,7 @@ def resets(rig: Rig, bench: Bench, key: HeldKey) -> None:
 
 
 @pytest.mark.parametrize("fault", ["second master enables", "enables itself"])
-def test_enabled_by_somebody_else_at_rest_is_a_latched_trip(tmp_path: Path, fault: str) -> None:
-    rig = Rig(tmp_path)
+def test_enabled_by_somebody_else_at_rest_is_a_latched_trip(rig: Rig, fault: str) -> None:
     with rig.opened() as bench:
         rig.wait(0.5)
         start = rig.time
@@ -155,8 +154,7 @@ def test_enabled_by_somebody_else_at_rest_is_a_latched_trip(tmp_path: Path, faul
         bench.winch["A"].move_by(pay_out=0.02)
 
 
-def test_turning_while_disabled_is_a_latched_trip(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_turning_while_disabled_is_a_latched_trip(rig: Rig) -> None:
     with rig.opened() as bench:
         rig.wait(0.5)
         rig.slaves[0].inject("turns while disabled", 5.0)
@@ -170,8 +168,7 @@ def test_turning_while_disabled_is_a_latched_trip(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", ["velocity stuck", "position stuck", "status frozen"])
-def test_a_stuck_value_is_noticed_when_the_key_is_released(tmp_path: Path, fault: str) -> None:
-    rig = Rig(tmp_path)
+def test_a_stuck_value_is_noticed_when_the_key_is_released(rig: Rig, fault: str) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         start = rig.time
@@ -188,8 +185,7 @@ def test_a_stuck_value_is_noticed_when_the_key_is_released(tmp_path: Path, fault
 
 
 @pytest.mark.parametrize("fault", ["rpdo unheard", "sync unheard", "host frames lost", "tpdo lost"])
-def test_the_dead_man_expires_into_a_fault(tmp_path: Path, fault: str) -> None:
-    rig = Rig(tmp_path)
+def test_the_dead_man_expires_into_a_fault(rig: Rig, fault: str) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         key.release()
@@ -202,8 +198,7 @@ def test_the_dead_man_expires_into_a_fault(tmp_path: Path, fault: str) -> None:
         assert seen.rest <= expires + _WITHIN + seen.speed / _RAMP + _LAG
 
 
-def test_an_over_tension_stops_winding_in_and_lets_it_out(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_an_over_tension_stops_winding_in_and_lets_it_out(rig: Rig) -> None:
     limits = {"tension_high": "200 N"}
     with rig.opened(bench_text(rig.channel, limits=limits)) as bench:
         tension = [100.0]
@@ -227,9 +222,8 @@ def test_an_over_tension_stops_winding_in_and_lets_it_out(tmp_path: Path) -> Non
 
 
 def test_an_emergency_without_a_fault_is_reported_and_trips_only_where_declared(
-    tmp_path: Path,
+    rig: Rig,
 ) -> None:
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         key = jogging(rig, bench)
         rig.slaves[0].inject("emergency", 0x4210)
@@ -240,8 +234,7 @@ def test_an_emergency_without_a_fault_is_reported_and_trips_only_where_declared(
         rig.wait(1.0)
 
 
-def test_a_reset_that_fails_leaves_the_latch(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_reset_that_fails_leaves_the_latch(rig: Rig) -> None:
     slave = rig.slaves[0]
     with rig.opened() as bench:
         key = jogging(rig, bench)
@@ -265,9 +258,8 @@ def test_a_reset_that_fails_leaves_the_latch(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("same_kind", [False, True])
 def test_what_trips_during_a_reset_after_the_drives_were_looked_at_stays(
-    tmp_path: Path, *, same_kind: bool
+    rig: Rig, *, same_kind: bool
 ) -> None:
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         rig.from_stranger(0x000, b"\x02\x01")
         rig.wait(0.3)
@@ -293,8 +285,7 @@ def test_what_trips_during_a_reset_after_the_drives_were_looked_at_stays(
         bench.winch["A"].move_by(pay_out=0.02)
 
 
-def test_a_reset_says_what_tripped_while_it_set_drives_up(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_reset_says_what_tripped_while_it_set_drives_up(rig: Rig) -> None:
     with rig.opened() as bench:
         rig.from_stranger(0x000, b"\x02\x01")
         rig.wait(0.3)
@@ -306,11 +297,8 @@ def test_a_reset_says_what_tripped_while_it_set_drives_up(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("boot_time", [0.02, 0.3, 0.8])
-def test_a_drive_that_restarts_during_a_reset_is_set_up_anew(
-    boot_time: float, tmp_path: Path
-) -> None:
+def test_a_drive_that_restarts_during_a_reset_is_set_up_anew(boot_time: float, rig: Rig) -> None:
     """Its last feedback, operation enabled, is no motion to wait for."""
-    rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:
         key = jogging(rig, bench)
@@ -335,9 +323,8 @@ def test_a_drive_that_restarts_during_a_reset_is_set_up_anew(
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_position_that_jumps_ends_the_motion_and_is_unknown_until_homed(
-    moving: bool, tmp_path: Path
+    moving: bool, rig: Rig
 ) -> None:
-    rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:
         winch = bench.winch["A"]
@@ -367,8 +354,7 @@ def test_a_position_that_jumps_ends_the_motion_and_is_unknown_until_homed(
         assert winch.cable_length == pytest.approx(2.02, abs=2e-3)
 
 
-def test_a_stall_of_this_computer_is_named(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_stall_of_this_computer_is_named(rig: Rig) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         start = rig.time
@@ -416,9 +402,8 @@ def _supervisor(bench: Bench) -> None:
 
 @pytest.mark.parametrize("break_", [_unsigned_target, _snapshot, _supervisor])
 def test_an_exception_in_the_control_loop_stops_the_drive_and_is_named(
-    tmp_path: Path, break_: Callable[[Bench], None]
+    rig: Rig, break_: Callable[[Bench], None]
 ) -> None:
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         key = jogging(rig, bench)
         start = rig.time
@@ -439,8 +424,7 @@ def test_an_exception_in_the_control_loop_stops_the_drive_and_is_named(
         again.winch["A"].jog(pay_out=0.1)
 
 
-def test_a_drive_stopped_by_another_master_comes_back_with_a_reset(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_drive_stopped_by_another_master_comes_back_with_a_reset(rig: Rig) -> None:
     with rig.opened() as bench:
         rig.from_stranger(0x000, b"\x02\x01")
         rig.wait(0.5)
@@ -454,8 +438,7 @@ def test_a_drive_stopped_by_another_master_comes_back_with_a_reset(tmp_path: Pat
         bench.winch["A"].move_by(pay_out=0.02)
 
 
-def test_the_latch_outlives_a_killed_process(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_the_latch_outlives_a_killed_process(rig: Rig) -> None:
     bench = rig.open()
     key = jogging(rig, bench)
     rig.slaves[0].inject("second master disables")
@@ -472,9 +455,8 @@ def test_the_latch_outlives_a_killed_process(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("turned", [0.6, -0.6])
-def test_a_brake_that_lets_the_load_creep_is_noticed(tmp_path: Path, turned: float) -> None:
+def test_a_brake_that_lets_the_load_creep_is_noticed(rig: Rig, turned: float) -> None:
     """At 1.8 mm/s of cable: below every speed that counts as a motion at rest."""
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         for length in (3.0, 4.0, 3.0):  # another zero is no motion
             bench.winch["A"].home(at=length)

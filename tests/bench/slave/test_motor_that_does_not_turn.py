@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -20,9 +19,8 @@ _MOTIONS: dict[str, Callable[[Winch], None]] = {
 
 @pytest.mark.parametrize("motion", _MOTIONS)
 @pytest.mark.parametrize("share", [0.0, 0.3])
-def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, share: float) -> None:
+def test_a_motion_that_is_not_made_is_an_error(rig: Rig, motion: str, share: float) -> None:
     """``share`` of what is commanded is what the motor does."""
-    rig = Rig(tmp_path)
     with rig.opened() as bench:
         rig.wait(0.3)
         rig.slaves[0].inject("follows wrongly", share)
@@ -43,10 +41,9 @@ def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, shar
 
 
 def test_an_encoder_that_stands_still_with_the_speed_derived_from_it_is_seen_after_20_mm(
-    tmp_path: Path,
+    rig: Rig,
 ) -> None:
     """The motor turns as commanded, 6064h and 606Ch stand still: the lag is all that shows."""
-    rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:
         rig.wait(0.3)

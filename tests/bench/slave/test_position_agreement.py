@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -43,8 +42,7 @@ _ROWS = (
 
 
 @pytest.mark.parametrize("row", _ROWS, ids=lambda r: f"{r.fault} {r.value} at {r.speed} m/s")
-def test_what_contradicts_stops_the_motion(tmp_path: Path, row: Row) -> None:
-    rig = Rig(tmp_path)
+def test_what_contradicts_stops_the_motion(rig: Rig, row: Row) -> None:
     slave = rig.slaves[0]
     with rig.opened() as bench:
         key = HeldKey(rig, bench, pay_out=row.speed).press()
@@ -81,10 +79,9 @@ def _unknown_until_homed(rig: Rig, bench: Bench) -> None:
 @pytest.mark.parametrize("moving", [False, True])
 @pytest.mark.parametrize("turns", [2.0, -0.3])
 def test_a_jump_that_a_motion_could_explain_is_seen(
-    tmp_path: Path, turns: float, *, moving: bool
+    rig: Rig, turns: float, *, moving: bool
 ) -> None:
     """Two turns are 37 mm, less than the motor turns in a quarter of a second at its limit."""
-    rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:
         rig.wait(0.5)
@@ -104,9 +101,8 @@ def test_a_jump_that_a_motion_could_explain_is_seen(
 
 @pytest.mark.parametrize("speed", [0.01, 0.3])
 def test_a_scale_that_is_declared_wrongly_is_found_at_the_first_motion(
-    tmp_path: Path, speed: float
+    rig: Rig, speed: float
 ) -> None:
-    rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:
         slave.inject("position scaled", 2.0)
@@ -121,8 +117,7 @@ def test_a_scale_that_is_declared_wrongly_is_found_at_the_first_motion(
 
 
 @pytest.mark.parametrize("fault", ["tpdo repeated", "rpdo repeated"])
-def test_frames_that_come_twice_are_no_contradiction(tmp_path: Path, fault: str) -> None:
-    rig = Rig(tmp_path)
+def test_frames_that_come_twice_are_no_contradiction(rig: Rig, fault: str) -> None:
     with rig.opened() as bench:
         rig.slaves[0].inject(fault)
         bench.winch["A"].jog(pay_out=0.1, duration=1.0)

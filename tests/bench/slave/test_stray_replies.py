@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from slave.rig import Rig
@@ -18,8 +16,7 @@ STRAYS = {
 
 @pytest.mark.parametrize("stray", STRAYS)
 @pytest.mark.parametrize("after", [0.005, 0.02])
-def test_a_transfer_takes_its_own_reply_only(tmp_path: Path, stray: str, after: float) -> None:
-    rig = Rig(tmp_path)
+def test_a_transfer_takes_its_own_reply_only(rig: Rig, stray: str, after: float) -> None:
     with rig.opened() as bench:
         node = bench.axes["A"].objects
         node.write(0x607C, 0, 4711)

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from can_commands import Served, invoke, length, served, without_trip
+from can_commands import Served, length, served, without_trip
+from command_line import invoke
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase

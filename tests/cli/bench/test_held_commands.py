@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
+from command_line import invoke
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.errors import MotionError
 from winchkit.robot.cli.hold_platform import _require_reached
 from winchkit.schema.read import read_simbench
@@ -32,7 +31,7 @@ def test_a_rehearsal_has_cells_and_enables_the_drives(
     spec = read_simbench(find("sim", sim)).bench
     file = tmp_path / "bench.toml"
     write_bench(replace(spec, cycle=0.02), file)
-    done = CliRunner().invoke(main, [*arguments, "-b", str(file), "--dry-run", "--json"])
+    done = invoke(*arguments, "-b", file, "--dry-run", "--json")
     assert done.exit_code == 0, done.output
     frames = json.loads(done.stdout)["frames"]
     assert {"RPDO", "SYNC"} <= {frame["kind"] for frame in frames}

@@ -16,9 +16,10 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import winchkit
+from command_line import invoke
 from winchkit.cli import main
 from winchkit.cli.core.output import to_json
 from winchkit.errors import (
@@ -53,7 +54,7 @@ def running(
     """Run the command line with another body in place of a command."""
     command = click.Command(name, callback=body)
     monkeypatch.setattr("winchkit.cli.files.check.command", command)
-    return CliRunner().invoke(main, [name])
+    return invoke(name)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_start_up_imports_nothing_heavy(code: str) -> None:
 
 
 def test_help_lists_every_command() -> None:
-    result = CliRunner().invoke(main, ["--help"])
+    result = invoke("--help")
     assert result.exit_code == 0
     for name, entry in main.table.items():
         assert f"  {name} " in result.output
@@ -85,7 +86,7 @@ def test_help_lists_every_command() -> None:
 
 
 def test_the_version() -> None:
-    result = CliRunner().invoke(main, ["--version"])
+    result = invoke("--version")
     assert (result.exit_code, result.output) == (0, f"winchkit, version {winchkit.__version__}\n")
 
 
@@ -97,20 +98,20 @@ def test_the_package_is_the_command_line_too() -> None:
 
 @pytest.mark.parametrize("name", sorted(main.table))
 def test_every_command_of_the_table_is_there(name: str) -> None:
-    result = CliRunner().invoke(main, [name, "--help"])
+    result = invoke(name, "--help")
     assert result.exit_code == 0
     assert result.output.startswith("Usage: ")
 
 
 def test_a_wrong_option_is_usage() -> None:
-    assert CliRunner().invoke(main, ["check", "--wrong"]).exit_code == 2
-    assert CliRunner().invoke(main, ["check"]).exit_code == 2
+    assert invoke("check", "--wrong").exit_code == 2
+    assert invoke("check").exit_code == 2
 
 
 def test_options_are_environment_variables(tmp_path: Path) -> None:
     file = tmp_path / "p.toml"
     file.write_text('schema = 1\nkind = "programme"\n[[step]]\nhold = "1 s"\n')
-    result = CliRunner().invoke(main, ["check", str(file)], env={"WINCHKIT_CHECK_JSON": "1"})
+    result = invoke("check", file, env={"WINCHKIT_CHECK_JSON": "1"})
     assert json.loads(result.stdout)["files"][0]["ok"] is True
 
 
@@ -227,7 +228,7 @@ def test_an_interrupt_during_the_imports_is_one_line() -> None:
     ],
 )
 def test_an_unknown_command_suggests_the_one_that_is_meant(word: str, meant: str) -> None:
-    result = CliRunner().invoke(main, [word])
+    result = invoke(word)
     assert result.exit_code == 2
     assert meant in result.stderr
 

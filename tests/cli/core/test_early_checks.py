@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from winchkit.cli import main
+from command_line import invoke
 
 BENCH = """schema = 1
 kind = "bench"
@@ -65,7 +64,7 @@ def test_what_is_refused_without_a_bus(
         (tmp_path / f"{name}.toml").write_text(
             'schema = 1\nkind = "programme"\n' + STEP.format(winch)
         )
-    result = CliRunner().invoke(main, line.split())
+    result = invoke(*line.split())
     assert result.exit_code == code, result.output
     assert message in result.stderr
     assert "Errno" not in result.stderr
@@ -88,7 +87,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     """The run is no run: a command that read it first would report that."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.csv").write_text("no run")
-    result = CliRunner().invoke(main, words.split())
+    result = invoke(*words.split())
     assert result.exit_code in {2, 3}
     assert message in result.stderr
     assert "Traceback" not in result.stderr
@@ -115,6 +114,6 @@ def test_a_file_of_another_kind_is_named_by_its_kind(
     (tmp_path / "runs").mkdir()
     (tmp_path / "p.toml").write_text('schema = 1\nkind = "winch"\n')
     (tmp_path / "a.csv").write_text("time [s],motor_angle [rad]\n0,0\n1,1\n2,2\n")
-    result = CliRunner().invoke(main, words.split())
+    result = invoke(*words.split())
     assert result.exit_code == 3
     assert message in result.stderr

@@ -11,14 +11,12 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 from calibration_cases import EXACT, rows
 from can_commands import served, without_trip
-from command_tree import examples
+from command_line import examples, invoke
 from robot_poses.truth import csv
 from served import Served as ServedCell
-from winchkit.cli import main
 from winchkit.cli.core.command import Example
 
 ROOT = Path(__file__).parents[3]
@@ -104,7 +102,7 @@ def run(line: str, code: int = 0) -> None:
     before, _, written = before.partition(" > ")
     words = [w for word in shlex.split(before)[1:] for w in (sorted(glob(word)) or [word])]
     typed = Path(redirected.strip()).read_text(encoding="utf-8") if redirected else INPUT
-    result = CliRunner().invoke(main, words, input=typed)
+    result = invoke(*words, input=typed)
     assert result.exit_code == code, f"{line}\nends with {result.exit_code}:\n{result.output}"
     if written:
         Path(written.strip()).write_text(result.stdout, encoding="utf-8")

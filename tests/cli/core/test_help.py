@@ -9,10 +9,9 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 
-from command_tree import commands, examples
-from winchkit.cli import main
+from command_line import commands, examples, invoke
 from winchkit.cli.core.command import LETTERS
 from winchkit.cli.core.messages import suggest_next
 
@@ -30,10 +29,6 @@ NOT_RUN = {
     "needs a drive that is alone on its bus",
 }
 MOTION = 'schema = 1\nkind = "programme"\n[[step]]\nhold = "1 s"\n'
-
-
-def invoke(*arguments: object, text: str | bytes | None = None) -> Result:
-    return CliRunner().invoke(main, [str(item) for item in arguments], input=text)
 
 
 @pytest.fixture
@@ -107,7 +102,7 @@ def test_quiet_leaves_out_everything_but_results(folder: Path) -> None:
     assert told.stderr == f"next: winchkit compare {told.stdout.strip()} -p bench-spiral\n"
     assert quiet.stderr == ""
     assert invoke("-q", *words).stderr == "", "as of the whole command line"
-    assert CliRunner().invoke(main, words, env={"WINCHKIT_QUIET": "1"}).stderr == ""
+    assert invoke(*words, env={"WINCHKIT_QUIET": "1"}).stderr == ""
     assert "exclude each other" in invoke(*words, "-qv").stderr
 
 
@@ -115,7 +110,7 @@ def test_verbose_reports_what_was_read_and_how_long(folder: Path) -> None:
     (folder / "m.toml").write_text(MOTION)
     environment = {"WINCHKIT_SIM_RECORD_RATE": "10 Hz"}
     words = ("sim", "record", "spiral-bench", "m.toml", "--replace", "-v")
-    lines = CliRunner().invoke(main, words, env=environment).stderr.splitlines()
+    lines = invoke(*words, env=environment).stderr.splitlines()
     reported = [line.partition(" s] ")[2] for line in lines if line.startswith("[")]
     assert reported[0] == "--rate 10 Hz by WINCHKIT_SIM_RECORD_RATE"
     assert "read m.toml: programme" in reported
@@ -156,17 +151,17 @@ def test_a_suggestion_can_be_copied(folder: Path, files: list[str], shown: str) 
 
 
 def test_a_file_from_standard_input(folder: Path) -> None:
-    assert "-: ok (programme" in invoke("check", "-", text=MOTION).stdout
-    wrong = invoke("check", "-", text=MOTION.replace("hold", "hald"))
+    assert "-: ok (programme" in invoke("check", "-", input=MOTION).stdout
+    wrong = invoke("check", "-", input=MOTION.replace("hold", "hald"))
     assert wrong.exit_code == 3
     assert "\n-:4: step[1].hald: unknown key; did you mean 'hold'?" in wrong.stderr
     (folder / "m.toml").write_text(MOTION)
     assert invoke("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz").exit_code == 0
     [run] = folder.glob("*.csv")
     rows = run.read_bytes()
-    assert "-: ok (run 'stdin'" in invoke("check", "-", text=rows).stdout
-    assert invoke("export", "-", "-o", "x.mcap", text=rows).exit_code == 0
-    assert "-: ok (run 'stdin'" in invoke("check", "-", text=Path("x.mcap").read_bytes()).stdout
+    assert "-: ok (run 'stdin'" in invoke("check", "-", input=rows).stdout
+    assert invoke("export", "-", "-o", "x.mcap", input=rows).exit_code == 0
+    assert "-: ok (run 'stdin'" in invoke("check", "-", input=Path("x.mcap").read_bytes()).stdout
 
 
 @pytest.mark.parametrize(
@@ -186,7 +181,7 @@ def test_a_file_from_standard_input(folder: Path) -> None:
 )
 def test_where_standard_input_cannot_be(words: tuple[str, ...], message: str) -> None:
     text = "" if words[0] == "size" else MOTION.replace('hold = "1 s"', 'ask = "ready?"')
-    result = invoke(*words, text=text)
+    result = invoke(*words, input=text)
     assert result.exit_code == 2, result.output
     assert message in result.stderr
 
@@ -196,5 +191,5 @@ def test_the_copy_of_standard_input_is_deleted(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(folder))
-    assert invoke("check", "-", text=MOTION).exit_code == 0
+    assert invoke("check", "-", input=MOTION).exit_code == 0
     assert list(folder.iterdir()) == []

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
 
-from command_tree import commands
-from winchkit.cli import main
+from command_line import commands, invoke
 from winchkit.cli.core.quantity_type import QuantityType, naming
 from winchkit.errors import UsageError
 from winchkit.units import parse
@@ -33,10 +31,6 @@ COMPOUND = {
     "log --rotate": WRONG,
 }
 """Options whose value has more than a quantity."""
-
-
-def run(*words: str) -> Result:
-    return CliRunner().invoke(main, list(words))
 
 
 def is_quantity(parameter: click.Parameter) -> bool:
@@ -66,7 +60,7 @@ def test_a_wrong_unit_names_the_option(words: str, parameter: click.Parameter) -
     name = naming(parameter)
     values = [WRONG] * parameter.nargs
     given = [name, *values] if isinstance(parameter, click.Option) else ["A", *values]
-    result = run(*words.split(), *given)
+    result = invoke(*words.split(), *given)
     assert result.exit_code == 2
     assert name in result.stderr
     assert f"'{WRONG}'" in result.stderr
@@ -92,7 +86,7 @@ def test_a_wrong_unit_within_a_value_names_the_option(
         "log": ["-o", "log.csv", "-b", "bench.toml"],
         "move": ["-b", "bench.toml"],
     }[words]
-    result = run(*words.split(), *more, f"--{name}", COMPOUND[option])
+    result = invoke(*words.split(), *more, f"--{name}", COMPOUND[option])
     assert result.exit_code == 2, result.stderr
     assert f"--{name}" in result.stderr
     assert "furlongs" in result.stderr
@@ -119,9 +113,9 @@ def _is(text: str, dimension: str) -> bool:
 
 
 def test_a_bound_is_given_with_its_option() -> None:
-    result = run("move", "--to", "1e9m")
+    result = invoke("move", "--to", "1e9m")
     assert result.exit_code == 2
     assert "--to: '1e9m' must be at most 100000 m" in result.stderr
-    result = run("log", "--for", "-3s")
+    result = invoke("log", "--for", "-3s")
     assert result.exit_code == 2
     assert "--for: '-3s' is below zero" in result.stderr

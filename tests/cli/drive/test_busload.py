@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from can_commands import invoke
+from command_line import invoke
 from winchkit.drivers.can.bus.load import FrameKind, frame_bits, load_of
 from winchkit.errors import NotPermitted
 

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from can_commands import Served, invoke, served
+from can_commands import Served, served
+from command_line import invoke
 from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.sim.drive.nmt import NodeState
 
@@ -230,13 +231,13 @@ def test_store_and_restore_change_what_the_next_start_finds(bench: Served) -> No
     drive = bench.live.winches["B"].drive
     default = drive.objects.number(0x6085)
     drive.objects.put(0x6085, 0, 7777)
-    refused = invoke("config", "store", "B", "-b", bench.file, text="n\n")
+    refused = invoke("config", "store", "B", "-b", bench.file, input="n\n")
     assert refused.exit_code == 1
     stored = invoke("config", "store", "B", "-b", bench.file, "--yes")
     assert stored.exit_code == 0, stored.output
     restart(bench)
     assert drive.objects.number(0x6085) == 7777
-    restored = invoke("config", "restore", "B", "-b", bench.file, text="y\n")
+    restored = invoke("config", "restore", "B", "-b", bench.file, input="y\n")
     assert restored.exit_code == 0, restored.output
     restart(bench)
     assert drive.objects.number(0x6085) == default

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 from click.testing import Result
 
-from can_commands import invoke
+from command_line import invoke
 from lss_device import LssDevice
 
 IDENTITY = (0x26C, 0x12345, 0x10002, 0xDEADBEEF)

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner
 
-from can_commands import invoke
+from command_line import invoke
 from winchkit import catalog
 from winchkit.cli import main
 
@@ -42,7 +41,7 @@ def complete(line: str, **environment: str) -> list[str]:
         "_WINCHKIT_COMPLETE": "bash_complete",
         **environment,
     }
-    done = CliRunner().invoke(main, env=words, prog_name="winchkit")
+    done = invoke(env=words, prog_name="winchkit")
     assert done.exit_code == 0, done.output
     return [item.partition(",")[2] for item in done.stdout.splitlines() if item]
 

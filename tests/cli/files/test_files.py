@@ -6,9 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
-from winchkit.cli import main
+from command_line import invoke
 from winchkit.runs import read_run
 
 ROOT = Path(__file__).parents[3]
@@ -26,10 +25,6 @@ ratio = 20
 """
 RUN = "time [s],A.motor_angle [deg],B.motor_angle [rad],A.tension [kN]\n"
 RUN += "".join(f"{n / 10},{n},{n},{'' if n == 2 else n}\n" for n in range(5))
-
-
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 @pytest.fixture

@@ -13,17 +13,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
 from logger_layouts import COUNTS, LAYOUTS, RATED, motion
-from winchkit.cli import main
 from winchkit.runs import read_run
 
 HEAD = "time [s],position [deg],speed [rpm],torque [%],force [N]"
 
 
 def command(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["import", *map(str, arguments)])
+    return invoke("import", *arguments)
 
 
 def log(path: Path, head: str = HEAD) -> Path:
@@ -289,7 +289,7 @@ def test_check_reads_a_mapping_with_every_fault(tmp_path: Path) -> None:
         'unit = "furlong"\n'
     )
     mapping.write_text(text)
-    result = CliRunner().invoke(main, ["check", str(mapping)])
+    result = invoke("check", mapping)
     assert result.exit_code == 3
     assert "mapping.toml:7: log[1].column[1].channel: 'tenson' is no channel" in result.stderr
     assert (

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
-from winchkit.cli import main
+from command_line import invoke
 
 MOTION = """\
 schema = 1
@@ -21,10 +20,6 @@ speed = "0.2 m/s"
 acceleration = "0.5 m/s^2"
 """
 ROWS = "\n".join(f"{k / 100},{k % 50},{k % 7}" for k in range(120))
-
-
-def invoke(*words: str | Path) -> Result:
-    return CliRunner().invoke(main, [*map(str, words)])
 
 
 def test_simulated_runs_of_another_seed_replace_none(tmp_path: Path) -> None:

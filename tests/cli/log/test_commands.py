@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
 from fed import recording
 from winchkit import catalog
 from winchkit.bench.recording.provenance import git_state, origin
-from winchkit.cli import main
 from winchkit.cli.core.terminal import HEADS, counter_rows, counter_table
 from winchkit.runs import read_run
 from winchkit.runs.recording.rotation import Rotation
@@ -23,7 +23,7 @@ from winchkit.schema.read import read_simbench
 
 
 def run(*words: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, ["log", *map(str, words)])
+    result = invoke("log", *words)
     assert result.exit_code == code, result.output
     return result
 
@@ -176,9 +176,7 @@ def test_what_log_refuses_before_it_opens_a_bench(words: list[str], part: str) -
 
 
 def test_subcommands_have_environment_variables_too(log: Path) -> None:
-    result = CliRunner().invoke(
-        main, ["log", "info", str(log)], env={"WINCHKIT_LOG_INFO_JSON": "1"}
-    )
+    result = invoke("log", "info", log, env={"WINCHKIT_LOG_INFO_JSON": "1"})
     assert json.loads(result.stdout)["schema"] == 1
 
 

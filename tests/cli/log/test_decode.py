@@ -11,22 +11,15 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
+from command_line import done, invoke
 from winchkit import catalog
-from winchkit.cli import main
 from winchkit.runs import read_run
 
 TURN = 65536
 """Increments of the device file generic-cia402, whose rated torque is 2 N m."""
 FOLDER = Path(os.environ.get("WINCHKIT_INPUTS", Path(__file__).parents[4] / "shared/data/inputs"))
 INPUTS = FOLDER / "candump"
-
-
-def run(*words: object, code: int = 0) -> Result:
-    result = CliRunner().invoke(main, [*map(str, words)])
-    assert result.exit_code == code, result.output
-    return result
 
 
 def motion(time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,11 +48,11 @@ def trace(tmp_path: Path) -> Path:
 
 
 def test_a_trace_in_words_and_as_json(trace: Path) -> None:
-    lines = run("log", "decode", trace, "--device", "generic-cia402").stdout.splitlines()
+    lines = done("log", "decode", trace, "--device", "generic-cia402").stdout.splitlines()
     assert len(lines) == 1 + 3 * 800
     assert "701  heartbeat  node 1: boot-up" in lines[0]
     assert "6041h Statusword 1637h operation enabled, follows the command" in lines[2]
-    words = run("log", "decode", trace, "--device", "1=generic-cia402", "--only", "tpdo", "--json")
+    words = done("log", "decode", trace, "--device", "1=generic-cia402", "--only", "tpdo", "--json")
     found = json.loads(words.stdout)
     assert found["layout"] == "candump -L"
     assert {frame["kind"] for frame in found["frames"]} == {"TPDO"}
@@ -67,7 +60,7 @@ def test_a_trace_in_words_and_as_json(trace: Path) -> None:
 
 
 def test_a_trace_is_imported_as_a_run_in_si(trace: Path, tmp_path: Path) -> None:
-    result = run("import", trace, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
+    result = done("import", trace, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
     assert "are those of the device file" in result.stderr
     got = read_run(tmp_path / "runs" / "lift.csv")
     start = datetime.fromisoformat(got.metadata["start_time"]).timestamp() - 1.7e9
@@ -90,7 +83,7 @@ def test_the_counter_of_a_position_wraps_at_32_bits(trace: Path, tmp_path: Path)
         lines.append(head + mark + data)
     path = tmp_path / "wraps.log"
     path.write_text("\n".join(lines) + "\n")
-    result = run("import", path, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
+    result = done("import", path, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
     assert "wraps at" in result.stderr
     got = read_run(tmp_path / "runs" / "wraps.csv")
     start = datetime.fromisoformat(got.metadata["start_time"]).timestamp() - 1.7e9
@@ -105,19 +98,19 @@ def test_several_nodes_are_winches_and_several_buses_are_refused(
     second = [line.replace(" 181#", " 182#").replace(" 281#", " 282#") for line in lines]
     both = tmp_path / "both.log"
     both.write_text("\n".join(line for pair in zip(lines, second, strict=True) for line in pair))
-    run("import", both, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
+    done("import", both, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
     got = read_run(tmp_path / "runs" / "both.csv")
     assert got.winches() == ["1", "2"]
     np.testing.assert_array_equal(got["1.motor_angle"], got["2.motor_angle"])
     buses = {line.split()[1] for line in lines}
     both.write_text(both.read_text().replace(f"{buses.pop()} 182#", "other 182#"))
-    told = run("import", both, "--device", "generic-cia402", code=3).stderr
+    told = done("import", both, "--device", "generic-cia402", code=3).stderr
     assert "split it by bus" in told
 
 
 def test_by_an_eds_alone_the_import_asks_for_the_units(trace: Path) -> None:
     eds = catalog.find("devices", "generic-cia402").parent / "generic-cia402.eds"
-    shown = run("import", trace, "--device", eds).stdout
+    shown = done("import", trace, "--device", eds).stdout
     assert "6064h Position actual v…  motor_angle" in shown
     assert "--counts-per-turn" in shown
     assert "1/360 turn" not in shown, "increments and increments a second are no degrees"
@@ -125,9 +118,9 @@ def test_by_an_eds_alone_the_import_asks_for_the_units(trace: Path) -> None:
 
 
 def test_without_a_device_the_import_names_the_option(trace: Path) -> None:
-    assert "--device D" in run("import", trace, code=3).stderr
-    assert "--device D" in run("check", trace, code=3).stderr
-    assert "--device D" in run("log", "info", trace, code=3).stderr
+    assert "--device D" in done("import", trace, code=3).stderr
+    assert "--device D" in done("check", trace, code=3).stderr
+    assert "--device D" in done("log", "info", trace, code=3).stderr
 
 
 @pytest.mark.parametrize(
@@ -148,7 +141,7 @@ def test_what_cannot_be_decoded_is_refused_with_its_place(
     path = tmp_path / "bus.log"
     if content is not None:
         path.write_bytes(content)
-    result = CliRunner().invoke(main, ["log", "decode", str(path), "--device", device])
+    result = invoke("log", "decode", path, "--device", device)
     assert result.exit_code in (2, 3)
     assert message in result.stderr
 
@@ -156,18 +149,18 @@ def test_what_cannot_be_decoded_is_refused_with_its_place(
 def test_a_table_is_no_trace(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time [s],position [deg]\n" + "".join(f"{k / 100},{k}\n" for k in range(50)))
-    assert "no FILE is one" in run("import", path, "--device", "generic-cia402", code=2).stderr
+    assert "no FILE is one" in done("import", path, "--device", "generic-cia402", code=2).stderr
 
 
 @pytest.mark.skipif(not INPUTS.is_dir(), reason="the inputs are not on this computer")
 def test_logs_that_people_paste() -> None:
     device = ("--device", "generic-cia402")
-    words = run("log", "decode", INPUTS / "L.log", *device).stdout
+    words = done("log", "decode", INPUTS / "L.log", *device).stdout
     for part in ("0637h", "6064h Position actual value 10000", "606Ch Velocity actual value 300"):
         assert part in words
     assert "6077h Torque actual value 5" in words
     assert "EMCY 8110h" in words
-    refused = run("log", "decode", INPUTS / "tz.log", *device).stdout
+    refused = done("log", "decode", INPUTS / "tz.log", *device).stdout
     assert refused.count("refused: Code 0x06010002") == 2
     assert "60FEh:1" in refused
-    assert "start" in run("log", "decode", INPUTS / "plain.log", *device).stdout
+    assert "start" in done("log", "decode", INPUTS / "plain.log", *device).stdout

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_files import edited, invoke
+from command_line import invoke
+from model_files import edited
 from winchkit.catalog import find
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals

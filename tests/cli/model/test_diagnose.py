@@ -7,36 +7,24 @@ import re
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
 from calibration_cases import rows
+from command_line import done, invoke
+from model_files import write_runs
 from report_answers import answer_of, diagnosis_of, recorded
 from robot_poses.truth import csv
-from winchkit.cli import main
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Estimate, Step
-from winchkit.runs import write_run
-
-
-def call(*arguments: object) -> Result:
-    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
-    assert result.exit_code == 0, result.output
-    return result
 
 
 @pytest.fixture(scope="module")
 def elastic(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Runs of a bench with an elastic cable."""
-    folder = tmp_path_factory.mktemp("elastic")
-    files = []
-    for run in recorded("demo-elastic-rope"):
-        files.append(folder / Path(run.name).with_suffix(".csv").name)
-        write_run(run, files[-1])
-    return files
+    return write_runs(tmp_path_factory.mktemp("elastic"), recorded("demo-elastic-rope"))
 
 
 def test_the_answer_with_the_next_command_is_one_screen(elastic: list[Path]) -> None:
-    result = call("diagnose", *elastic, "-p", "bench-spiral")
+    result = done("diagnose", *elastic, "-p", "bench-spiral")
     lines = [*result.stdout.splitlines(), *result.stderr.splitlines()]
     assert len(lines) <= 30
     assert lines[0] == "EXPLAINED"
@@ -46,8 +34,8 @@ def test_the_answer_with_the_next_command_is_one_screen(elastic: list[Path]) -> 
 
 
 def test_verbose_adds_how_it_was_reached(elastic: list[Path]) -> None:
-    short = call("diagnose", *elastic, "-p", "bench-spiral").stdout
-    long = call("diagnose", *elastic, "-p", "bench-spiral", "-v").stdout
+    short = done("diagnose", *elastic, "-p", "bench-spiral").stdout
+    long = done("diagnose", *elastic, "-p", "bench-spiral", "-v").stdout
     assert long.startswith(short.splitlines()[0])
     for part in ("detectable with these runs (90 % power)", "highest evidence", "correlation"):
         assert part in long
@@ -62,38 +50,33 @@ def test_a_robot_whose_geometry_differs_as_a_whole_is_calibrated_next(
     real = answer_of("demo-adequate")
     found = WinchAnswer(real.engine, real.result, diagnosis_of("explained", whole))
     monkeypatch.setattr("winchkit.diagnosis.diagnose.diagnose", lambda *_, **__: found)
-    result = call("diagnose", *elastic, "-p", "bench-spiral")
+    result = done("diagnose", *elastic, "-p", "bench-spiral")
     assert "Calibrate the robot first" in result.stdout
     assert "next: winchkit calibrate bench-spiral" in result.stderr
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    folder = tmp_path_factory.mktemp("runs")
-    files = []
-    for run in recorded("demo-thick-layers"):
-        files.append(str(folder / f"{run.name}.csv"))
-        write_run(run, files[-1])
-    return files
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return write_runs(tmp_path_factory.mktemp("runs"), recorded("demo-thick-layers"))
 
 
 @pytest.mark.slow
-def test_a_diagnosis_prints_its_fit(runs: list[str]) -> None:
+def test_a_diagnosis_prints_its_fit(runs: list[Path]) -> None:
     options = ["diagnose", *runs, "--profile", "bench-spiral"]
-    shown = CliRunner().invoke(main, [*options, "--fit-report"])
+    shown = invoke(*options, "--fit-report")
     assert shown.exit_code == 0, shown.output
     assert re.search(r"layer-thickness\.thickness_error: +4\.9\d+e-05 \+/- ", shown.stdout)
-    found = json.loads(CliRunner().invoke(main, [*options, "--json"]).stdout)["fit"]
+    found = json.loads(invoke(*options, "--json").stdout)["fit"]
     assert found["dof"] == found["n_observations"] - found["n_unknowns"]
     assert f"= {found['chi_square']:.6g}" in shown.stdout
-    assert "[[Fit" not in CliRunner().invoke(main, options).stdout
+    assert "[[Fit" not in invoke(*options).stdout
 
 
 def test_a_calibration_prints_its_fit(tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
     poses.write_text(csv(rows()))
     options = ["calibrate", "cabtive", str(poses), "-o", str(tmp_path / "new.toml")]
-    shown = CliRunner().invoke(main, [*options, "--fit-report"])
+    shown = invoke(*options, "--fit-report")
     assert shown.exit_code == 0, shown.output
     assert "[[Variables]]\n    1.exit_point.x:" in shown.stdout
     assert "reduced chi-square" in shown.stdout

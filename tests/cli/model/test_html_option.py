@@ -7,33 +7,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
+from model_files import write_runs
 from report_answers import recorded
 from report_parsed import Page
-from winchkit.cli import main
-from winchkit.runs import write_run
 
 COMMANDS = ["compare", "diagnose", "add"]
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    folder = tmp_path_factory.mktemp("runs")
-    paths = []
-    for run in recorded("demo-elastic-rope")[:2]:
-        paths.append(str(folder / f"{run.name}.csv"))
-        write_run(run, paths[-1])
-    return paths
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return write_runs(tmp_path_factory.mktemp("runs"), recorded("demo-elastic-rope")[:2])
 
 
-def asked(command: str, runs: list[str], html: Path, *more: str) -> Result:
+def asked(command: str, runs: list[Path], html: Path, *more: str) -> Result:
     words = [command, *runs, "--profile", "bench-spiral"]
     if command == "add":
         better = str(html.parent / "better.toml")
         words = ["add", "cable-elongation-linear", "--fit", *runs, "-p", "bench-spiral"]
         words += ["-o", better if html.parent.is_dir() else str(Path(runs[0]).parent / "b.toml")]
-    return CliRunner().invoke(main, [*words, "--html", str(html), *more])
+    return invoke(*words, "--html", html, *more)
 
 
 @dataclass(frozen=True)
@@ -47,7 +42,7 @@ class Written:
 
 @pytest.fixture(scope="module", params=COMMANDS)
 def written(
-    request: pytest.FixtureRequest, runs: list[str], tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest, runs: list[Path], tmp_path_factory: pytest.TempPathFactory
 ) -> Written:
     folder = tmp_path_factory.mktemp(request.param)
     html, figures = folder / "new" / "page.html", folder / "figures"
@@ -57,7 +52,7 @@ def written(
 
 
 @pytest.mark.slow
-def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[str]) -> None:
+def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[Path]) -> None:
     result, html = written.result, written.html
     assert f"report: {html}" in result.stderr.splitlines()
     page = Page(html.read_text(encoding="utf-8"))
@@ -65,12 +60,12 @@ def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[str]
     printed = json.loads(result.stdout)
     assert json.loads(raw).keys() == printed.keys()
     assert json.loads(raw)["outputs"] == printed["outputs"]
-    assert " ".join(runs) in page.text
+    assert " ".join(map(str, runs)) in page.text
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(
-    command: str, runs: list[str], tmp_path: Path
+    command: str, runs: list[Path], tmp_path: Path
 ) -> None:
     html = tmp_path / "no" / "such" / "page.html"
     result = asked(command, runs, html)
@@ -82,13 +77,13 @@ def test_a_page_that_cannot_be_written_is_refused_before_the_work(
     assert not html.parent.exists()
 
 
-def test_a_folder_is_no_page(runs: list[str], tmp_path: Path) -> None:
+def test_a_folder_is_no_page(runs: list[Path], tmp_path: Path) -> None:
     result = asked("compare", runs, tmp_path)
     assert result.exit_code == 3
     assert "it is a folder; name a file" in result.stderr
 
 
-def test_a_run_named_by_mistake_stays_what_it_is(runs: list[str]) -> None:
+def test_a_run_named_by_mistake_stays_what_it_is(runs: list[Path]) -> None:
     taken = Path(runs[0])
     held = taken.read_bytes()
     result = asked("compare", runs, taken)
@@ -97,7 +92,7 @@ def test_a_run_named_by_mistake_stays_what_it_is(runs: list[str]) -> None:
     assert taken.read_bytes() == held
 
 
-def test_a_page_replaces_an_earlier_page(runs: list[str], tmp_path: Path) -> None:
+def test_a_page_replaces_an_earlier_page(runs: list[Path], tmp_path: Path) -> None:
     html = tmp_path / "page.html"
     html.touch()
     assert asked("compare", runs, html).exit_code == 0
@@ -107,7 +102,7 @@ def test_a_page_replaces_an_earlier_page(runs: list[str], tmp_path: Path) -> Non
 
 
 def test_the_page_repeats_the_options_that_it_was_asked_with(
-    runs: list[str], tmp_path: Path
+    runs: list[Path], tmp_path: Path
 ) -> None:
     html = tmp_path / "page.html"
     assert asked("compare", runs, html, "--band", "7.5").exit_code == 0
@@ -125,9 +120,9 @@ def test_every_figure_of_the_page_is_written_as_png_svg_and_csv(written: Written
     assert "bench-spiral" in (folder / f"{shown[0]}.svg").read_text(encoding="utf-8")
 
 
-def test_figures_need_a_folder_whose_parent_exists(runs: list[str], tmp_path: Path) -> None:
+def test_figures_need_a_folder_whose_parent_exists(runs: list[Path], tmp_path: Path) -> None:
     words = ["compare", runs[0], "-p", "bench-spiral", "--figures", str(tmp_path / "no" / "such")]
-    result = CliRunner().invoke(main, words)
+    result = invoke(*words)
     assert result.exit_code == 3
     assert "the figures cannot be written" in result.stderr
     assert "cable length" in result.stdout

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from model_files import SHIPPED, answer, invoke, record_files
+from command_line import invoke
+from model_files import SHIPPED, answer, record_files
 from winchkit.schema.read import read_profile
 
 

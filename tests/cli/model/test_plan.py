@@ -8,13 +8,14 @@ from typing import Any
 import click
 import pytest
 
-from model_files import answer, invoke, record_files
+from command_line import invoke
+from model_files import answer, record_files, write_runs
 from winchkit.catalog import find
 from winchkit.cli.model.plan import suggest_run
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.plan import programme_of
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, usual_temperature
-from winchkit.runs import read_run, write_run
+from winchkit.runs import read_run
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of
@@ -26,11 +27,7 @@ PROFILE = find("profiles", "bench-spiral")
 
 
 def recorded(programme: Programme, folder: Path) -> list[Path]:
-    out = []
-    for run in simulate(BENCH, profiles_of(BENCH), programme, seed=0):
-        out.append(folder / f"{run.name}.csv")
-        write_run(run, out[-1])
-    return out
+    return write_runs(folder, simulate(BENCH, profiles_of(BENCH), programme, seed=0))
 
 
 @pytest.fixture(scope="module")

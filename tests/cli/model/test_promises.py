@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from model_files import SHIPPED, answer, invoke, record_files, side_by_side
+from command_line import invoke
+from model_files import SHIPPED, answer, record_files, side_by_side
 from winchkit.runs import read_run, write_run
 from winchkit.schema.read import read_profile
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from model_files import answer, invoke, record_files
+from command_line import invoke
+from model_files import answer, record_files
 from report_parsed import Page
 from winchkit.schema.read import read_profile
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from model_files import HEIGHT, KINK, SHIPPED, answer, invoke, kinked, record_files
+from command_line import invoke
+from model_files import HEIGHT, KINK, SHIPPED, answer, kinked, record_files
 
 
 @pytest.fixture

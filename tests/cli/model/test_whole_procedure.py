@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from model_files import answer, invoke
+from command_line import invoke
+from model_files import answer
 from winchkit.bench.control.cable import CableMap
 from winchkit.catalog import find
 from winchkit.effects import terms_of

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from winchkit.cli import main
+from command_line import invoke
 
 
 @pytest.fixture
@@ -39,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_wrong_input_ends_it_with_one_line(
     folder: Path, arguments: list[str], code: int, message: str
 ) -> None:
-    result = CliRunner().invoke(main, ["serve", "--no-browser", *arguments])
+    result = invoke("serve", "--no-browser", *arguments)
     assert result.exit_code == code, result.output
     assert result.stdout == "", "no URL"
     (line,) = result.stderr.strip().splitlines()

@@ -20,12 +20,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from command_line import invoke
 from winchkit import FileError, open_writer, write_run
-from winchkit.cli import main
 from winchkit.errors import ConnectionLost
 from winchkit.fleet import diagnose_library, index_library
 from winchkit.fleet.library import cluster, diagnose
@@ -126,7 +125,7 @@ def test_the_list_of_a_library_has_the_verdict_of_every_run(
     library: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def listed() -> list[str]:
-        result = CliRunner().invoke(main, ["library", "list", str(library)])
+        result = invoke("library", "list", library)
         assert result.exit_code == 0, result.output
         return result.stdout.splitlines()
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
+from command_line import invoke
 from winchkit import UsageError, write_run
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.fleet import index_library
 from winchkit.fleet.library import diagnose
 from winchkit.fleet.library.history import library_history
@@ -67,7 +67,7 @@ def put(library: Path, path: str, seed: int, samples: int = 200) -> None:
 
 def fleet(command: str, library: Path, *arguments: object) -> Result:
     given = ["fleet", command, str(library), "-p", "bench-spiral", *map(str, arguments)]
-    return CliRunner().invoke(main, [*given, *(["--jobs", "1"] if command == "diagnose" else [])])
+    return invoke(*given, *["--jobs", "1"] if command == "diagnose" else [])
 
 
 def reports(library: Path, tmp_path: Path) -> dict[str, Result]:

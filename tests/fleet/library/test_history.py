@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from hypothesis import given
 from hypothesis import strategies as st
 
+from command_line import invoke
 from winchkit import write_run
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.effects.term import Term
 from winchkit.fleet import index_library
 from winchkit.fleet.diagnosis.history import fleet_history
@@ -93,7 +93,7 @@ def test_a_fleet_without_changes_has_none() -> None:
 
 
 def run(*arguments: object) -> Result:
-    return CliRunner().invoke(main, ["fleet", "trend", *map(str, arguments)])
+    return invoke("fleet", "trend", *arguments)
 
 
 def test_a_step_is_found_and_dated_on_the_command_line(tmp_path: Path) -> None:

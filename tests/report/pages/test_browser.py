@@ -9,12 +9,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from click.testing import CliRunner
 
 from browsing import NEEDS_CHROMIUM, chromium
+from command_line import invoke
+from model_files import write_runs
 from report_answers import recorded
-from winchkit.cli import main
-from winchkit.runs.writer import write_run
 
 pytest.importorskip("playwright.sync_api")
 pytest.importorskip("matplotlib")
@@ -28,12 +27,9 @@ pytestmark = [pytest.mark.slow, NEEDS_CHROMIUM]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """``report.html`` and ``figures/`` of one comparison, as the command line writes them."""
     made = tmp_path_factory.mktemp("report")
-    paths = []
-    for run in recorded("demo-elastic-rope"):
-        paths.append(str(made / f"{run.name}.csv"))
-        write_run(run, paths[-1])
+    paths = write_runs(made, recorded("demo-elastic-rope"))
     options = ["--html", str(made / "report.html"), "--figures", str(made / "figures")]
-    done = CliRunner().invoke(main, ["compare", *paths, "-p", "bench-spiral", *options])
+    done = invoke("compare", *paths, "-p", "bench-spiral", *options)
     assert done.exit_code in {0, 1}, done.output
     return made
 

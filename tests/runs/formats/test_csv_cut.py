@@ -6,9 +6,8 @@ import csv
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
-from winchkit.cli import main
+from command_line import invoke
 from winchkit.errors import RunError
 from winchkit.runs import open_writer, read_run
 from winchkit.runs.recover import recover
@@ -57,12 +56,12 @@ def test_check_warns_of_a_cut_log_and_names_what_helps(log: Path) -> None:
     data = log.read_bytes()
     assert data.endswith(b",20.0\n")
     log.write_bytes(data[: -len("0.0\n")])
-    result = CliRunner().invoke(main, ["check", str(log)])
+    result = invoke("check", log)
     assert result.exit_code == 0
     assert "7 rows" in result.stdout
     assert f"`winchkit log recover {log}`" in result.stderr
     assert "(warning)" in result.stderr
-    told = CliRunner().invoke(main, ["log", "info", str(log)])
+    told = invoke("log", "info", log)
     assert "the file is cut off" in told.stdout
     assert read_run(recover(log).output)["temperature"].tolist() == [20.0] * 7
 

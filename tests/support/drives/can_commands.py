@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
 
 from bare_winches import bare_winches
-from winchkit.cli import main
+from command_line import invoke
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
@@ -24,11 +23,6 @@ CLOCKS = (
     "winchkit.bench.drives.node_access",
     "winchkit.bench.emergency_stop",
 )
-
-
-def invoke(*arguments: object, text: str | None = None) -> Result:
-    """A command line; its output and exit code."""
-    return CliRunner().invoke(main, [str(item) for item in arguments], input=text)
 
 
 @dataclass

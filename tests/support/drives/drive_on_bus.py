@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import itertools
 import os
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
-import can
-
-from flywheel import Flywheel
+from drive_server import DriveServer
 from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -21,8 +17,6 @@ from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
-from winchkit.sim.drive.drive import SimDrive
-from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
 
 CLOCK = MonotonicClock()
 _channels = itertools.count()
@@ -40,39 +34,20 @@ def device() -> DeviceSpec:
     return read_device(catalog.find("devices", "generic-cia402"))
 
 
-class DriveOnBus:
-    """Runs a SimDrive in a thread of its own; a context manager."""
+class DriveOnBus(DriveServer):
+    """A drive in a thread of its own, on a virtual bus; a context manager."""
 
     def __init__(self, bus: BusSpec, node: int = 1, *, brake: bool = True) -> None:
-        self._bus = can.Bus(interface="virtual", channel=bus.channel)
-        self.frames: list[tuple[int, bytes]] = []
-        self.shaft = Flywheel()
-        spec = device()
-        assert spec.servo is not None
-        self.drive = SimDrive(
-            self._send,
-            node,
-            spec.servo,
-            ObjectDictionary(read_eds(Path(spec.path).parent / spec.servo.eds, node)),
-            self.shaft,
-            brake=brake,
-            now=time.monotonic(),
-        )
-        self.drive.power_on(time.monotonic(), boot_time=0.02)
-        self.lock = threading.Lock()
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
+        options = {"interface": "virtual", "channel": bus.channel}
+        super().__init__(options, node, brake=brake, boot=0.02)
 
     def __enter__(self) -> DriveOnBus:
-        self._thread.start()
         while self.drive.nmt.name == "BOOTING":
             time.sleep(0.005)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stopping.set()
-        self._thread.join()
-        self._bus.shutdown()
+        self.close()
 
     def shout(self, identifier: int, data: bytes) -> None:
         """Send any frame as if the drive had."""
@@ -82,19 +57,6 @@ class DriveOnBus:
         """Control words that came in RPDO 1."""
         node = self.drive.node
         return [int.from_bytes(d[:2], "little") for i, d in self.frames if i == 0x200 + node]
-
-    def _send(self, identifier: int, data: bytes) -> None:
-        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
-
-    def _run(self) -> None:
-        while not self._stopping.is_set():
-            message = self._bus.recv(0.001)
-            with self.lock:
-                now = time.monotonic()
-                if message is not None:
-                    self.frames.append((message.arbitration_id, bytes(message.data)))
-                    self.drive.receive(message.arbitration_id, bytes(message.data), now)
-                self.drive.tick(now)
 
 
 Driven = tuple[DriveOnBus, CanBus]

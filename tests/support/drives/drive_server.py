@@ -32,9 +32,14 @@ class DriveServer:
     clock), state, motor speed.
     """
 
-    def __init__(self, options: dict[str, Any]) -> None:
+    def __init__(
+        self, options: dict[str, Any], node: int = NODE, *, brake: bool = True, boot: float = 0.01
+    ) -> None:
         self._bus = can.Bus(**options)
-        self._lock = threading.Lock()
+        self._node, self._brake, self._boot = node, brake, boot
+        self.frames: list[tuple[int, bytes]] = []
+        """All that came."""
+        self.lock = threading.Lock()
         self._stopping = threading.Event()
         self.renew()
         self._thread = threading.Thread(target=self._run, name="drive", daemon=True)
@@ -50,26 +55,26 @@ class DriveServer:
         declared = read_device(catalog.find("devices", device))
         assert declared.servo is not None
         eds = Path(declared.path).parent / declared.servo.eds
-        with self._lock:
+        with self.lock:
             now = time.monotonic()
             self.record: list[tuple[float, str, float]] = []
             self.host_heard = self.at_rest_since = self.worst_gap = 0.0
             self.shaft = Flywheel()
             self.drive = SimDrive(
                 self._send,
-                NODE,
+                self._node,
                 declared.servo,
-                ObjectDictionary(read_eds(eds, NODE)),
+                ObjectDictionary(read_eds(eds, self._node)),
                 self.shaft,
-                brake=True,
+                brake=self._brake,
                 now=now,
             )
-            self.drive.power_on(now, boot_time=0.01)
+            self.drive.power_on(now, boot_time=self._boot)
             self._last = now
 
     def see(self) -> dict[str, Any]:
         """How it is now."""
-        with self._lock:
+        with self.lock:
             return {
                 "state": self.drive.state.name,
                 "nmt": self.drive.nmt.name,
@@ -83,20 +88,20 @@ class DriveServer:
             }
 
     def number(self, index: int, sub: int = 0) -> int:
-        with self._lock:
+        with self.lock:
             return self.drive.objects.number(index, sub)
 
     def put(self, index: int, sub: int, value: int) -> None:
-        with self._lock:
+        with self.lock:
             self.drive.objects.put(index, sub, value)
 
     def inject(self, kind: str) -> None:
-        with self._lock:
+        with self.lock:
             self.drive.inject(kind)
 
     def forget(self) -> None:
         """Begin the record anew."""
-        with self._lock:
+        with self.lock:
             self.record.clear()
             self.worst_gap = 0.0
 
@@ -106,12 +111,14 @@ class DriveServer:
     def _run(self) -> None:
         while not self._stopping.is_set():
             message = self._bus.recv(_WAIT)
-            with self._lock:
+            with self.lock:
                 now = time.monotonic()
                 if message is not None and not message.is_error_frame:
-                    if message.arbitration_id == 0x700 + HOST:
+                    identifier, data = message.arbitration_id, bytes(message.data)
+                    if identifier == 0x700 + HOST:
                         self.host_heard = now
-                    self.drive.receive(message.arbitration_id, bytes(message.data), now)
+                    self.frames.append((identifier, data))
+                    self.drive.receive(identifier, data, now)
                 self.drive.tick(now)
                 self._note(now)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import pytest
 
@@ -66,16 +67,9 @@ class FakeAxis:
     hears_sdos: bool = True
     moves_alone: bool = False
     stops_on_nmt: bool = False
-    second_master: str = ""
     position_jump: str = ""
-    position_disagreement: str = ""
     nmt_text: str = "operational"
     alarms: tuple[int, ...] = ()
-    alarm_text: str = ""
-    sdo_refused: bool = False
-    last_request_elsewhere: float = -math.inf
-    control_words_elsewhere: int = 0
-    sdo_state: DriveState | None = None
     sdo_stops: int = 0
     torque: float = 0.0
     lag: float = 0.0
@@ -91,20 +85,24 @@ class FakeAxis:
 
     silent: bool = False
     position_doubt: str = ""
-    trim_angle: float = 0.0
 
-    @property
-    def position_mark(self) -> tuple[int, int, str, bool]:
-        return 0, 0, self.position_doubt, True
+    def __post_init__(self) -> None:
+        self.second_master = SimpleNamespace(heard="", last_request=-math.inf, control_words=0)
+        self.sdo_stop = SimpleNamespace(
+            state=None, refused=False, send=self._stop_by_sdo, end=self._end_stop
+        )
+        self.position = SimpleNamespace(
+            mark=None, disagreement="", trim=0.0, keep=self._keep, lose=self._lose
+        )
 
-    def keep_position(self, *, closed: bool) -> KeptPosition | None:
+    def _keep(self, *, closed: bool) -> KeptPosition | None:
         feedback = self.feedback
         if feedback is None:
             return None
         return KeptPosition(round(1e4 * feedback.angle), 0, 0, self.position_doubt, closed)
 
-    def lose_position(self, doubt: str) -> None:
-        self.position_doubt = self.position_doubt or doubt
+    def _lose(self, doubt: str) -> None:
+        self.position_doubt = self.position.mark = self.position_doubt or doubt
 
     def fall_silent(self) -> bool:
         self.silent = True
@@ -161,20 +159,20 @@ class FakeAxis:
                 self.velocity = 25.0 * (angle - self.angle)
         return word
 
-    def stop_by_sdo(self) -> None:
+    def _stop_by_sdo(self) -> None:
         """It takes the write in this cycle, and reports its state in the next."""
         self.sdo_stops += 1
         if self.hears_sdos:
             if self.sdo_stops > 1:
-                self.sdo_state = self.state
+                self.sdo_stop.state = self.state
             if self.state is DriveState.OPERATION_ENABLED:
                 self.state = DriveState.QUICK_STOP_ACTIVE
 
     def stop_by_nmt(self) -> None:
         raise AssertionError("it was not seen to leave operation enabled on that")
 
-    def end_stop(self) -> None:
-        self.sdo_state, self.sdo_stops = None, 0
+    def _end_stop(self) -> None:
+        self.sdo_stop.state, self.sdo_stops = None, 0
 
     def emergency_stop(self, *, sdo: bool) -> None:
         """Prepared frames: no feedback is needed."""
@@ -182,7 +180,7 @@ class FakeAxis:
         if self.hears_pdos and self.state is DriveState.OPERATION_ENABLED:
             self.state = DriveState.QUICK_STOP_ACTIVE
         if sdo:
-            self.stop_by_sdo()
+            self._stop_by_sdo()
 
 
 @dataclass

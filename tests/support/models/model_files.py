@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from click.testing import CliRunner, Result
 
+from command_line import invoke
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.runs import write_run
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_programme, read_simbench
@@ -48,10 +47,6 @@ HEIGHT = 1.5e-3
 SHIPPED = Path(__file__).parents[3] / "profiles" / "bench-spiral.toml"
 
 
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 def answer(*arguments: object) -> dict[str, Any]:
     """What a command prints with --json: one line and nothing besides."""
     result = invoke(*arguments, "--json")
@@ -77,11 +72,18 @@ def record_files(
     out = []
     for name in ("programme-demo-fast", "programme-demo-slow"):
         programme = read_programme(programme_path(name))
-        for run in simulate(declared, profiles_of(declared), programme, seed=11):
-            path = folder / f"{run.name}.csv"
-            write_run(change(run) if change else run, path)
-            out.append(path)
+        runs = simulate(declared, profiles_of(declared), programme, seed=11)
+        out += write_runs(folder, map(change, runs) if change else runs)
     return out
+
+
+def write_runs(folder: Path, runs: Iterable[Run]) -> list[Path]:
+    """Runs as files of their names."""
+    paths = []
+    for run in runs:
+        paths.append(folder / f"{run.name}.csv")
+        write_run(run, paths[-1])
+    return paths
 
 
 def kinked(run: Run) -> Run:

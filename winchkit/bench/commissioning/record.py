@@ -20,7 +20,7 @@ from winchkit.drivers.can.canopen.node import Objects
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import FileError, NotPermitted
-from winchkit.regular_file import read_text, regular
+from winchkit.regular_file import file_errors, read_text, regular
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 
 SCHEMA = 1
@@ -109,11 +109,8 @@ class CommissioningRecord:
 
 def hash_of(path: str | Path) -> FileHash:
     """SHA-256 of a file, named without its folder; raises FileError."""
-    try:
-        with open(path, "rb", opener=regular) as file:
-            digest = hashlib.sha256(file.read()).hexdigest()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}") from error
+    with file_errors(path, "read"), open(path, "rb", opener=regular) as file:
+        digest = hashlib.sha256(file.read()).hexdigest()
     return FileHash(Path(path).name, digest)
 
 

@@ -107,14 +107,14 @@ class Trials:
                 self._keep_positions()
             for axis in self.axes.values():
                 with suppress(ConnectionLost):
-                    axis.disarm()
+                    axis.host.disarm()
 
     def _keep_positions(self) -> None:
         """Close the record of positions with where the drives are now, disabled and at rest."""
         axes = self.axes
         for _ in range(_FRESH):
             self._cycle(next(iter(axes.values())), RequestedState.DISABLE)
-        found = {name: axis.keep_position(closed=axis.at_rest) for name, axis in axes.items()}
+        found = {name: axis.position.keep(closed=axis.at_rest) for name, axis in axes.items()}
         self._positions.close_with({name: kept for name, kept in found.items() if kept is not None})
 
     def host_loss(self, name: str, speed: float = 0.0) -> TrialResult:
@@ -176,7 +176,7 @@ class Trials:
         axis = self.axes[name]
         for _ in range(_FRESH):
             self._cycle(axis, RequestedState.DISABLE)
-        self._keep(name, axis.keep_position(closed=False))
+        self._keep(name, axis.position.keep(closed=False))
         try:
             yield axis
         except BaseException:
@@ -185,7 +185,7 @@ class Trials:
                 self._wired_syncs()
             # The reply to the stop by SDO is not for the confirmed client.
             self._clock.sleep(_REPLY_TIME)
-            axis.end_stop()
+            axis.sdo_stop.end()
             self._recover(name)
             raise
         self._recover(name)
@@ -213,7 +213,7 @@ class Trials:
             bring_back(one.objects, self._clock, clears=True)
             one.commission()
         # By SDO: after SYNC and a heartbeat the drives would miss them while a question is open.
-        kept = axis.keep_position(closed=True)
+        kept = axis.position.keep(closed=True)
         self._keep(name, kept and replace(kept, count=node.read(0x6064)))
 
     def _enable(self, axis: Cia402Axis) -> None:

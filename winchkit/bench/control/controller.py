@@ -297,25 +297,25 @@ class Controller:
         write of 6040h is answered by a quick stop at once.
         """
         axis = self.axis
-        words, self._words_elsewhere = self._words_elsewhere, axis.control_words_elsewhere
+        words, self._words_elsewhere = self._words_elsewhere, axis.second_master.control_words
         if axis.operational and self._sync - feedback.sync <= _UNSEEN_SYNCS:
             if self._asked is not None:
                 self._asked = None
-                axis.end_stop()
+                axis.sdo_stop.end()
             return False
-        if axis.sdo_state is DriveState.OPERATION_ENABLED:
+        if axis.sdo_stop.state is DriveState.OPERATION_ENABLED:
             self._asked = None
-            axis.end_stop()
+            axis.sdo_stop.end()
             return True
         if words != self._words_elsewhere:
-            axis.end_stop()  # what is sent next is the quick stop again, and no further read
+            axis.sdo_stop.end()  # what is sent next is the quick stop again, and no further read
         elif (self._asked is not None and now - self._asked < _ASK_PERIOD) or (
-            now - axis.last_request_elsewhere < _TRANSFER_PAUSE
+            now - axis.second_master.last_request < _TRANSFER_PAUSE
         ):
             return False
         if heard_by_sdo(axis.nmt_text):
             self._asked = now
-            axis.stop_by_sdo()
+            axis.sdo_stop.send()
         return False
 
     def _leave(self, now: float, feedback: AxisFeedback) -> None:
@@ -428,12 +428,12 @@ class Controller:
             now, feedback
         ):
             self.uncommanded = "the drive was enabled while it was being stopped"
-            self.axis.end_stop()
+            self.axis.sdo_stop.end()
             self._stop_sync = self._sync
             self.escalation.begin(now, nmt=self.axis.stops_on_nmt)
         if sampled and feedback.state not in POWERED and self.axis.at_rest:
             self.escalation.end()
-            self.axis.end_stop()
+            self.axis.sdo_stop.end()
             self._enter(Phase.DISABLED, now)
 
     def _escalate(self, now: float, feedback: AxisFeedback) -> None:
@@ -441,14 +441,14 @@ class Controller:
         axis = self.axis
         fresh = feedback.sync > self._stop_sync and feedback.sync >= self._sync - _FRESH_SYNCS
         left = fresh and has_left(feedback.state)
-        by_sdo = axis.sdo_state
+        by_sdo = axis.sdo_stop.state
         left = left or (by_sdo is not None and has_left(by_sdo))
         if self.escalation.method is StopMethod.NMT:
             left = left or not heard_by_sdo(axis.nmt_text)
-        answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused
+        answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_stop.refused
         method = self.escalation.step(now, StopEvidence(left, axis.operational, answers))
         if method is StopMethod.SDO:
-            axis.stop_by_sdo()
+            axis.sdo_stop.send()
         elif method is StopMethod.NMT:
             axis.stop_by_nmt()
 

@@ -231,7 +231,7 @@ class ControlLoop:
 
     def _at_rest_or_open(self) -> dict[str, KeptPosition]:
         found = {
-            name: parts.axis.keep_position(closed=parts.controller.phase is Phase.DISABLED)
+            name: parts.axis.position.keep(closed=parts.controller.phase is Phase.DISABLED)
             for name, parts in self.winches.items()
         }
         return {name: kept for name, kept in found.items() if kept is not None}
@@ -239,7 +239,7 @@ class ControlLoop:
     def _keep_positions(self) -> None:
         """Write the record of positions where a drive begins to be enabled, rests, or is lost."""
         marks = [
-            (parts.controller.phase is Phase.DISABLED, parts.axis.position_mark)
+            (parts.controller.phase is Phase.DISABLED, parts.axis.position.mark)
             for parts in self.winches.values()
         ]
         if marks == self._marks:
@@ -339,7 +339,7 @@ class ControlLoop:
         for bus, _, _ in self._buses:
             _attempt(bus.sync)
         for parts in self.winches.values():
-            _attempt(parts.axis.stop_by_sdo)
+            _attempt(parts.axis.sdo_stop.send)
         _LOGGER.error("the control loop failed", exc_info=error)
         self.supervisor.latch(
             Trip(
@@ -371,7 +371,7 @@ class ControlLoop:
                 parts.controller.phase is not Phase.DISABLED
                 and now - self._broken_at < _HEARD_WITHIN
             ):
-                _attempt(parts.axis.stop_by_sdo)
+                _attempt(parts.axis.sdo_stop.send)
         rest = all(p.controller.phase is Phase.DISABLED for p in self.winches.values())
         if now - self._broken_at > _HEARD_WITHIN and not rest and not self._ramping():
             _attempt(self._fall_silent)
@@ -452,7 +452,7 @@ class ControlLoop:
                 parts.controller.phase,
                 parts.cable.correction,
                 parts.commander,
-                parts.axis.trim_angle,
+                parts.axis.position.trim,
             )
             for parts in self.winches.values()
         ]

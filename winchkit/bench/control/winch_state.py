@@ -142,7 +142,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             sensors.get("cell"),  # tension
             "" if operational else axis.nmt_text,
             controller.take_uncommanded(),
-            axis.second_master,
+            axis.second_master.heard,
             phase is Phase.DISABLED,
             follows,
             target_speed,
@@ -150,12 +150,12 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             way,
             math.nan if length is None else _fresh(length, now),
             emergencies,
-            axis.alarm_text if emergencies else "",
+            axis.emergencies.standing if emergencies else "",
             "" if frozen is None else frozen.unstable,
             "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
             doubt,
             axis.position_jump,
-            axis.position_disagreement,
+            axis.position.disagreement,
             sensors,
             now,
             feedback,
@@ -170,7 +170,7 @@ def _beyond_the_drum(parts: WinchParts, length: float) -> str:
         return ""
     limit = "below zero" if length < least else f"more than the {greatest:.3f} m that its drum has"
     doubt = f"6064h would mean {length:.3f} m, which is {limit}"
-    parts.axis.lose_position(doubt)
+    parts.axis.position.lose(doubt)
     return doubt
 
 

@@ -326,7 +326,7 @@ def bus_load(bench: str | Path | BenchSpec) -> dict[str, BusLoad]:
 
     Returns
     -------
-    dict of str to Load
+    dict of str to BusLoad
         By bus: ``share`` of its bit rate, ``fastest()`` cycle that fits, s, and its frames.
     """
     spec, found = _spec(bench), {}

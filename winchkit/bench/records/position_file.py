@@ -94,17 +94,7 @@ class PositionFile:
 
 def _record(positions: Mapping[str, KeptPosition], *, ended: bool) -> str:
     rows = {
-        name: {
-            "count": kept.count,
-            "offset": kept.offset,
-            "zero": kept.zero,
-            "doubt": kept.doubt,
-            "closed": kept.closed,
-            "serial": kept.serial,
-            "unit": kept.unit,
-            "trim": kept.trim,
-            "objects": [[*key, value] for key, value in kept.objects.items()],
-        }
+        name: vars(kept) | {"objects": [[*key, value] for key, value in kept.objects.items()]}
         for name, kept in positions.items()
     }
     now = datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -20,6 +20,7 @@ from urllib.parse import quote
 
 from winchkit.errors import Fault, FileError
 from winchkit.fleet.library.tables import arrow_schema
+from winchkit.regular_file import file_errors
 from winchkit.runs.files import write_whole
 from winchkit.runs.recording.log_file import Lock, lock_file
 
@@ -115,10 +116,8 @@ class Partitions:
         where the folder cannot be written or its file system has no locks."""
         _made(self.folder)
         path = self.folder / f"{table}.lock"
-        try:
+        with file_errors(path):
             descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise _refused(path, error) from None
         try:
             while (state := lock_file(descriptor)) is Lock.BUSY:
                 waiting()
@@ -152,11 +151,5 @@ def _encoded(winch: str) -> str:
 
 
 def _made(folder: Path) -> None:
-    try:
+    with file_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _refused(folder, error) from None
-
-
-def _refused(path: Path, error: OSError) -> FileError:
-    return FileError(Fault(f"cannot be written: {error.strerror}", str(path)))

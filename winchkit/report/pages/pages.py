@@ -40,11 +40,10 @@ def report_html(
         return str(by_wing(answer, title, profile, options=options))
     assert isinstance(answer, WinchAnswer), "of a winch"
     command = CommandLine(answer.engine.regression.dataset, profile, options)
-    residuals = residuals_of(answer, command.source)
-    drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
+    outputs = answer.diagnosis.outputs
+    ladder, drawn, cards = _drawn(outputs, residuals_of(answer, command.source))
     patterns = unexplained_figures(answer, command.source)
     laws = open_law_figures(answer, command.source)
-    ladder = _ladder(answer.diagnosis.outputs, residuals)
     content = sections(
         answer,
         cards,
@@ -56,7 +55,7 @@ def report_html(
         open_laws=laws,
         ladder=ladder,
     )
-    html = page(title, [*present(ladder), *drawn, *laws, *patterns], content, headed=False)
+    html = page(title, [*drawn, *laws, *patterns], content, headed=False)
     return in_units_of(answer.engine.regression.dataset.profile, html)
 
 
@@ -65,11 +64,8 @@ def report_figures(answer: Answer, source: str = "") -> list[Figure]:
     if (by_wing := wings.call("figures", answer)) is not None:
         return list(by_wing(answer, source))
     assert isinstance(answer, WinchAnswer), "of a winch"
-    residuals = residuals_of(answer, source)
-    drawn, _ = _cards(residuals, {})
-    ladder = _ladder(answer.diagnosis.outputs, residuals)
-    laws = open_law_figures(answer, source)
-    return [*present(ladder), *drawn, *laws, *unexplained_figures(answer, source)]
+    _, drawn, _ = _drawn(answer.diagnosis.outputs, residuals_of(answer, source))
+    return [*drawn, *open_law_figures(answer, source), *unexplained_figures(answer, source)]
 
 
 def residuals_of(answer: WinchAnswer, source: str = "") -> Residuals:
@@ -125,13 +121,12 @@ def comparison_html(
     command = CommandLine(compared.regression.dataset, profile, options)
     residuals = residuals_of_comparison(compared, command.source)
     own = residual_figures(residuals)
-    drawn, cards = _cards(residuals, size_texts(compared.comparison.outputs), own)
+    ladder, drawn, cards = _drawn(compared.comparison.outputs, residuals, own)
     over = {one.output: one.followed for one in own if one.followed}
-    ladder = _ladder(compared.comparison.outputs, residuals)
     content = comparison_sections(
         compared.comparison, over, cards, command, title=title, ladder=ladder
     )
-    return page(title, [*present(ladder), *drawn], content, headed=False)
+    return page(title, drawn, content, headed=False)
 
 
 def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
@@ -139,9 +134,7 @@ def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
     if (by_wing := wings.call("figures", compared)) is not None:
         return list(by_wing(compared, source))
     assert isinstance(compared, WinchCompared), "of a winch"
-    residuals = residuals_of_comparison(compared, source)
-    ladder = _ladder(compared.comparison.outputs, residuals)
-    return [*present(ladder), *_cards(residuals, {})[0]]
+    return _drawn(compared.comparison.outputs, residuals_of_comparison(compared, source))[1]
 
 
 def addition_html(
@@ -157,12 +150,11 @@ def addition_html(
         return str(by_wing(fitted, title, profile, better, options=options))
     assert isinstance(fitted, FittedWinchAddition), "of a winch"
     command = CommandLine(fitted.regression.dataset, profile, options)
-    outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
-    drawn, cards = _cards(residuals, size_texts(outputs))
-    ladder = _ladder(outputs, residuals)
+    residuals = residuals_of_addition(fitted, command.source)
+    ladder, drawn, cards = _drawn(fitted.addition.outputs, residuals)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
     content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
-    html = page(title, [*present(ladder), *drawn], content, headed=False)
+    html = page(title, drawn, content, headed=False)
     return in_units_of(fitted.regression.dataset.profile, html)
 
 
@@ -171,30 +163,23 @@ def addition_figures(fitted: FittedAddition, source: str = "") -> list[Figure]:
     if (by_wing := wings.call("figures", fitted)) is not None:
         return list(by_wing(fitted, source))
     assert isinstance(fitted, FittedWinchAddition), "of a winch"
-    residuals = residuals_of_addition(fitted, source)
-    ladder = _ladder(fitted.addition.outputs, residuals)
-    return [*present(ladder), *_cards(residuals, {})[0]]
+    return _drawn(fitted.addition.outputs, residuals_of_addition(fitted, source))[1]
 
 
-def _ladder(
-    outputs: Mapping[str, OutputError] | Mapping[str, OutputFit], residuals: Residuals
-) -> Figure | None:
-    """Error of every output over its noise, with the changed model where there is one."""
-    return error_ladder(
+def _drawn(
+    outputs: Mapping[str, OutputError] | Mapping[str, OutputFit],
+    residuals: Residuals,
+    own: Sequence[OutputFigures] | None = None,
+) -> tuple[Figure | None, list[Figure], list[Markup]]:
+    """Error of every output over its noise, that and all figures of the outputs, and a card of each
+    output."""
+    own = residual_figures(residuals) if own is None else own
+    ladder = error_ladder(
         outputs,
         extended=residuals.after is not None,
         changed=residuals.changed,
         source=residuals.source,
     )
-
-
-def _cards(
-    residuals: Residuals,
-    sizes: Mapping[str, str],
-    own: Sequence[OutputFigures] | None = None,
-) -> tuple[list[Figure], list[Markup]]:
-    """All figures of the outputs, and a card of each output."""
-    own = residual_figures(residuals) if own is None else own
     maps = map_figures(residuals, {one.output: one.scale for one in own})
     every = [
         figure
@@ -202,4 +187,4 @@ def _cards(
         for figure in (one.over_time, one.over_variable, *maps.get(one.output, ()))
         if figure is not None
     ]
-    return every, drawings(own, maps, sizes)
+    return ladder, [*present(ladder), *every], drawings(own, maps, size_texts(outputs))

@@ -171,7 +171,7 @@ class CableCorrection:
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at a motor angle (rad), at rest or beside a motion of the platform."""
         self._begin, self._slope = angle, 1.0 / self._cable.at(angle)[1]
-        self._trimmed = self._axis.trim_angle
+        self._trimmed = self._axis.position.trim
         self.correction.join(self._index)
         self.at(time, time)
 
@@ -179,7 +179,7 @@ class CableCorrection:
         """Cable wound in since the start (m) and winding speed (m/s)."""
         found = self.correction.at(self._index, time, now)
         elongation = float(self.correction.elongation[self._index])
-        self._axis.trim_angle = self._trimmed + elongation * self._slope
+        self._axis.position.trim = self._trimmed + elongation * self._slope
         return found
 
     def target(self, time: float, angle: float, now: float) -> Setpoint:

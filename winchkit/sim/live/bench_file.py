@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from winchkit.catalog import Kind, find, folder
-from winchkit.errors import FileError
+from winchkit.regular_file import file_errors
 from winchkit.schema.bench import BenchSpec
 from winchkit.sim.physics.parameters import quantity_of
 from winchkit.units import UNITS
@@ -22,20 +22,15 @@ _NOT_IN_FILES = ("path", "latch_file")
 
 def write_bench(bench: BenchSpec, path: Path) -> Path:
     """Write a bench as a file; FileError where that is not possible."""
-    try:
+    with file_errors(path):
         path.write_text(f"{_MARK}\n{bench_toml(bench)}", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
     return path
 
 
 def is_written_here(path: Path) -> bool:
     """Whether :func:`write_bench` wrote this file; FileError where it cannot be read."""
-    try:
-        with path.open(encoding="utf-8", errors="replace") as lines:
-            return lines.readline(len(_MARK)) == _MARK
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}") from error
+    with file_errors(path, "read"), path.open(encoding="utf-8", errors="replace") as lines:
+        return lines.readline(len(_MARK)) == _MARK
 
 
 def bench_toml(bench: BenchSpec) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from winchkit.errors import FileError, UsageError, WinchkitError, suggest
+from winchkit.regular_file import file_errors
 from winchkit.schema.programme import ALL
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.client import REFUSED, address_file
@@ -87,10 +88,11 @@ class ControlServer:
     def __enter__(self) -> ControlServer:
         host, port = self._server.server_address[:2]
         try:
-            self._file.write_text(f"{host!s}:{port}\n", encoding="utf-8")
-        except OSError as error:
+            with file_errors(self._file):
+                self._file.write_text(f"{host!s}:{port}\n", encoding="utf-8")
+        except FileError:
             self._server.server_close()
-            raise FileError(f"{self._file}: cannot be written: {error.strerror}") from error
+            raise
         self._thread.start()
         return self
 

@@ -225,7 +225,7 @@ def test_a_makers_watchdog_is_declared_by_its_objects() -> None:
         assert found.proof is not None
         assert found.proof.noticed
         assert found.host_loss.mechanism == "vendor:deadline"
-        axis.disarm()
+        axis.host.disarm()
         assert slave.objects.get(0x1400, 5) == 0
 
 

@@ -175,11 +175,11 @@ def test_an_emergency_without_a_fault_stands_until_it_is_gone() -> None:
             rig.inject("emergency", 0x4210)
             time.sleep(0.1)
             assert axis.alarms == (0x4210,)
-            assert "EMCY 4210h drive over-temperature" in axis.alarm_text
+            assert "EMCY 4210h drive over-temperature" in axis.emergencies.standing
             with rig.lock:
                 rig.slaves[0].emergency.clear()
             time.sleep(0.1)
-            assert axis.alarm_text == ""
+            assert axis.emergencies.standing == ""
 
 
 @pytest.mark.parametrize("number", [errno.ENOBUFS, errno.EAGAIN])

@@ -28,7 +28,7 @@ from winchkit.drivers.can.cia402.modes import (
     require_mode,
     status_words,
 )
-from winchkit.drivers.can.cia402.motor_position import KeptPosition, MotorPosition
+from winchkit.drivers.can.cia402.motor_position import MotorPosition
 from winchkit.drivers.can.cia402.profile_parameters import (
     HomingSpec,
     set_homing,
@@ -87,7 +87,8 @@ class Cia402Axis:
         self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
         """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
-        self._position = MotorPosition(device.servo, watch)
+        self.position = MotorPosition(device.servo, watch)
+        """Whether and where the motor angle is known; its record."""
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
@@ -96,8 +97,8 @@ class Cia402Axis:
         """Whether the drive has had a life sign of the host since it was commissioned."""
         self._previous = 0
         self._quick_stop = watch.quick_stop
-        self._sdo_stop = SdoStop(bus, node)
-        self._others = SecondMaster(
+        self.sdo_stop = SdoStop(bus, node)
+        self.second_master = SecondMaster(
             bus, node, [pdo.number for pdo in device.servo.rpdo], watch.host
         )
         self._stop_frames: list[tuple[int, bytes]] = []
@@ -108,25 +109,25 @@ class Cia402Axis:
         """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
         self._gathering = self._commander = None
         self._previous = 0
-        stopping = self._sdo_stop.active
-        self._sdo_stop.hold(True)
+        stopping = self.sdo_stop.active
+        self.sdo_stop.hold(True)
         if stopping:
             # Its last reply would be taken for that of a transfer which begins meanwhile.
             self._clock.sleep(_LATE_REPLY)
         try:
             return self._commission()
         finally:
-            self._sdo_stop.hold(False)
+            self.sdo_stop.hold(False)
 
     def _commission(self) -> Commissioned:
         self.heartbeat.forget()
         await_booted(self._node, self.servo.boot_time, self._clock, self.heartbeat)
-        self._others.hear_further_servers(self._node)
-        self._others.hear_further_rpdos(self._node)
+        self.second_master.hear_further_servers(self._node)
+        self.second_master.hear_further_rpdos(self._node)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats, self._watched = self._bus.beats[self._watch.host], False
-        self._position.look(self._node)
+        self.position.look(self._node)
         drive = commission(self._node, self.servo, self._watch, self._clock, self.host)
         self.host.await_operational()
         if self._watch.prove:
@@ -135,7 +136,7 @@ class Cia402Axis:
             loss = self.host.reaction(proof, drive.options, seen=self._watch.seen_stopping)
             drive = dataclasses.replace(drive, proof=proof, host_loss=loss)
         self.host.arm()
-        counter = self._position.begin(drive, self._boot_ups)
+        counter = self.position.begin(drive, self._boot_ups)
         if counter.zero:
             self._require_unlimited()
         commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
@@ -168,29 +169,11 @@ class Cia402Axis:
             self._bus.withdraw(identifier)
             self._bus.send(identifier, data)
         if sdo:
-            self._sdo_stop.send()
-
-    def stop_by_sdo(self) -> None:
-        """Quick stop by SDO, and its state asked for, without waiting; raises ConnectionLost."""
-        self._sdo_stop.send()
+            self.sdo_stop.send()
 
     def stop_by_nmt(self) -> None:
         """NMT stop; raises ConnectionLost."""
         self._bus.nmt(NmtCommand.STOP, self._node.node)
-
-    def end_stop(self) -> None:
-        """End the stop by SDO: its replies go to the confirmed client again."""
-        self._sdo_stop.end()
-
-    @property
-    def sdo_state(self) -> DriveState | None:
-        """Power state read by SDO since the stop by SDO began."""
-        return self._sdo_stop.state
-
-    @property
-    def sdo_refused(self) -> bool:
-        """Whether it aborted the stop by SDO that is under way."""
-        return self._sdo_stop.refused
 
     @property
     def stops_on_nmt(self) -> bool:
@@ -215,98 +198,24 @@ class Cia402Axis:
         return tuple(in_force) if in_force else ()
 
     @property
-    def alarm_text(self) -> str:
-        """The emergency codes in force, in words."""
-        return self.emergencies.standing
-
-    def forget_alarms(self) -> None:
-        """Clear the emergency codes at a reset; the drive sends again those that still hold."""
-        self.emergencies.in_force.clear()
-
-    @property
-    def second_master(self) -> str:
-        """The first command to it that was not sent here, in words; empty where none was."""
-        return self._others.heard
-
-    @property
-    def last_request_elsewhere(self) -> float:
-        """When another SDO client last sent this drive a request, s."""
-        return self._others.last_request
-
-    @property
-    def control_words_elsewhere(self) -> int:
-        """SDO writes of 6040h by other clients so far."""
-        return self._others.control_words
-
-    def forget_second_master(self) -> None:
-        """A reset begins; another master's commands from now on are reported again."""
-        self._others.forget()
-
-    @property
     def position_doubt(self) -> str:
         """Why the motor angle is not known, in words; empty where it is."""
-        position = self._position
+        position = self.position
         return position.after_boot_up() if self.mapping_lost else position.doubt
-
-    @property
-    def trim_angle(self) -> float:
-        """Angle that corrections of the cable force have turned since the last homing, rad."""
-        return self._position.trim
-
-    @trim_angle.setter
-    def trim_angle(self, angle: float) -> None:
-        self._position.trim = angle
-
-    @property
-    def position_mark(self) -> tuple[int, int, str, bool]:
-        """What of the position's record changes besides the count."""
-        return self._position.mark
-
-    def keep_position(self, *, closed: bool) -> KeptPosition | None:
-        """The position for the record, ``closed`` at rest; None before the first feedback."""
-        return self._position.keep(closed=closed)
-
-    def recall_position(self, kept: KeptPosition | None) -> None:
-        """Take what the record says of the position; before it is commissioned."""
-        self._position.recall(kept)
-
-    def lose_position(self, doubt: str) -> None:
-        """Take the position as unknown until the drive is homed, for a reason in words."""
-        self._position.lose(doubt)
-
-    def note_zero(self, doubt: str = "") -> None:
-        """A homing has set the drive's zero; ``doubt`` says why the position is not known yet.
-
-        The status word does not say it later: some drives clear bits 10 and 12 when disabled.
-        """
-        self._position.note_zero(doubt)
 
     def define_position(self, angle: float) -> None:
         """Let the disabled motor have an angle (rad), by a zero that the record keeps."""
         self._disabled_drive("define its position")
         self._require_unlimited()
-        self._position.define(angle)
+        self.position.define(angle)
 
     @property
     def position_jump(self) -> str:
         """Change of 6064h that no motion explains, in words; empty without one."""
-        jump, twice = self._position.jump, self.health.late
+        jump, twice = self.position.jump, self.health.late
         if jump and twice:
             jump += f" ({twice} answers came beside another one: two nodes may have this number)"
         return jump
-
-    @property
-    def position_disagreement(self) -> str:
-        """Change of 6064h that 606Ch contradicts, in words; empty without one."""
-        return self._position.disagreement
-
-    def forget_position_jump(self) -> None:
-        """A reset begins; the position stays unknown until the drive is homed."""
-        self._position.forget_jump()
-
-    def disarm(self) -> None:
-        """Switch the host-loss mechanism of the drive, at rest, off; raises ConnectionLost."""
-        self.host.disarm()
 
     def fall_silent(self) -> bool:
         """End the life signs that the drive watches; returns whether SYNC is one of them."""
@@ -399,7 +308,7 @@ class Cia402Axis:
     @property
     def at_rest(self) -> bool:
         """Whether the newest feedback says that the motor stands still."""
-        return self._position.at_rest(self.feedback)
+        return self.position.at_rest(self.feedback)
 
     def begin_cycle(self, sync: int, now: float) -> None:
         """Note the SYNC that is about to be sent: TPDOs that follow were sampled at it."""
@@ -440,7 +349,7 @@ class Cia402Axis:
             requested,
             previous=self._previous,
             age=self._cycle[0] - feedback.sync,
-            at_rest=self._position.at_rest(feedback),
+            at_rest=self.position.at_rest(feedback),
         )
         # What Command(...) makes, without the call of its constructor.
         command = _new(CycleCommand, (requested, velocity, angle, torque, start))
@@ -459,7 +368,7 @@ class Cia402Axis:
         """
         drive = self._disabled_drive(f"change to {mode}")
         require_mode(self._node, drive.modes, mode)
-        commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
+        commander = Commander(self.name, drive, self._node.node, mode, self.position.counter)
         before, previous = self._commander, self._mode.name
         # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
         self._commander = commander
@@ -473,7 +382,7 @@ class Cia402Axis:
             if self._commander is not None:
                 self._stop_frames = self._commander.stop_frames()
             raise
-        self._position.changed_mode(previous, mode)
+        self.position.changed_mode(previous, mode)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
         """Set a homing up and change to HM, disabled; ``send`` with ``start`` runs it."""
@@ -530,8 +439,8 @@ class Cia402Axis:
             drive.tpdo,
             drive.scale,
             self._watch.cycle,
-            self._position.counter,
-            self._position.agreement,
+            self.position.counter,
+            self.position.agreement,
         )
         for codec in drive.tpdo:
             identifier = cob_id("tpdo", codec.spec.number, self._node.node)

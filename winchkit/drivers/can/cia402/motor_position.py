@@ -202,8 +202,11 @@ class MotorPosition:
             return False
         return self._standstill.take(seen.time, seen.angle, seen.velocity)
 
-    def note_zero(self, doubt: str) -> None:
-        """The drive has set its zero; ``doubt`` says why the position by it is not known yet."""
+    def note_zero(self, doubt: str = "") -> None:
+        """A homing has set the drive's zero; ``doubt`` says why the position is not known yet.
+
+        The status word does not say it later: some drives clear bits 10 and 12 when disabled.
+        """
         self._zero, self.trim = doubt, 0.0
 
     def define(self, angle: float) -> None:

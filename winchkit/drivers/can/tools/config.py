@@ -23,7 +23,7 @@ from winchkit.drivers.can.canopen.pdo import Key
 from winchkit.drivers.can.cia402.state_machine import DriveState, state_of
 from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
-from winchkit.regular_file import read_text
+from winchkit.regular_file import file_errors, read_text
 
 STORE, RESTORE = (0x1010, b"save"), (0x1011, b"load")
 """Object and signature that store all parameters, and bring back the maker's."""
@@ -252,10 +252,8 @@ _IDENTITY = ("vendor", "product", "revision", "serial")
 def write_config_file(path: Path, config: Config, eds: Path, node: int, bitrate: int) -> None:
     """Write a .json or .dcf file, the latter on the drive's EDS; raises FileError."""
     text = _json(config) if _is_json(path) else _dcf(config, eds, node, bitrate)
-    try:
+    with file_errors(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}") from error
 
 
 def read_config_file(path: Path, dictionary: Any) -> Config:

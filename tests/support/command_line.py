@@ -1,13 +1,27 @@
-"""Every command of the command line, with its words, options and examples."""
+"""Command lines in the process of the test; every command with its words and examples."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import click
+from click.testing import CliRunner, Result
 
 from winchkit.cli import main
 from winchkit.cli.core.command import Example
+
+
+def invoke(*words: object, **options: Any) -> Result:
+    """A command line; ``options`` as of CliRunner.invoke, e.g. ``input`` and ``env``."""
+    return CliRunner().invoke(main, [*map(str, words)], **options)
+
+
+def done(*words: object, code: int = 0) -> Result:
+    """A command line that ends with a code."""
+    result = invoke(*words)
+    assert result.exit_code == code, result.output
+    return result
 
 
 def commands() -> Iterator[tuple[str, click.Command]]:
