@@ -80,7 +80,7 @@ def test_the_first_run_belongs_to_the_shortest_set_that_separates_all_pairs() ->
     strengths, alike = np.array([[1000.0, 0.0], [9.2, 9.2]]), np.array([5.0, 5.0])
     assert _fewest_runs(strengths, alike) == pytest.approx([0.0, 2.0], abs=0.02)
     assert _fewest_runs(strengths[:, :1], alike) == pytest.approx([1.0, 0.0])
-    assert _fewest_runs(np.full((2, 1), 0.1), alike) == [0.0, 0.0]
+    assert not _fewest_runs(np.full((2, 1), 0.1), alike).any()
 
 
 def test_nothing_to_separate_needs_no_run() -> None:

@@ -34,11 +34,13 @@ from winchkit.schema.programme import Programme, ProgrammeStep
 
 _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
-_RUN_MINUTES, _LOADING_MINUTES, _WARMING_MINUTES = 5.0, 1 / 3, 20.0
-"""Time of an operator to begin and to keep a run, to change a load, and to warm the machine,
+_RUN_MINUTES, _LOADING_MINUTES, _WARMING_MINUTES = 10.0, 1 / 3, 20.0
+"""Time of an operator to prepare, watch and keep a run, to change a load, to warm the machine,
 minutes; rule of thumb."""
 _FULL = 18.33
 """λ of 90 % power against a limit of 9: (3 + Φ⁻¹(0.9))²; theory."""
+_SOME = 0.1
+"""Runs of a programme from which it belongs to a set of runs that is not whole; numerical."""
 _WEIGHT_STEP = 0.5
 """Loads are proposed in steps of this, kg; convention: weights at hand."""
 
@@ -57,7 +59,7 @@ class Offer:
 
     @property
     def worth(self) -> tuple[float, ...]:
-        """Sort key of programmes of which the shortest set of runs has as many, larger is better.
+        """Sort key within the shortest set of runs and of the others, larger is better.
 
         Pairs separated with at least 90 % power come first, then the sum of powers, then that per
         minute; where nothing is to be separated, effects that become detectable per minute.
@@ -132,12 +134,12 @@ def offers(
         )
         out.append(Offer(kind, minutes, powers, shows))
     minutes = np.array([_RUN_MINUTES + offer.minutes for offer in out])
-    counts = _fewest_runs(np.array(strengths), minutes)
-    order = sorted(range(len(out)), key=lambda i: (counts[i], out[i].worth), reverse=True)
+    chosen = _fewest_runs(np.array(strengths), minutes) >= _SOME
+    order = sorted(range(len(out)), key=lambda i: (chosen[i], out[i].worth), reverse=True)
     return [out[i] for i in order]
 
 
-def _fewest_runs(strengths: Array, minutes: Array) -> list[float]:
+def _fewest_runs(strengths: Array, minutes: Array) -> Array:
     """Runs of each programme that together separate every pair in the least time.
 
     ``strengths`` are λ, (n_programmes, n_pairs). A linear programme: the shares of the λ that a
@@ -145,11 +147,11 @@ def _fewest_runs(strengths: Array, minutes: Array) -> list[float]:
     """
     wanted = [p for p in strengths.T if power_to_separate(float(np.max(p))) >= LEAST_POWER]
     if not wanted:
-        return [0.0] * len(strengths)
+        return np.zeros(len(strengths))
     shares = np.minimum(np.array(wanted) / _FULL, 1.0)
     found = linprog(minutes, A_ub=-shares, b_ub=-np.ones(len(shares)))
     assert found.x is not None, "enough runs of each programme separate every pair that is wanted"
-    return [round(float(count), 3) for count in found.x]
+    return np.asarray(found.x)
 
 
 def _is_detected(threshold: DetectionThreshold, term: Term, noncentrality: float) -> bool:
