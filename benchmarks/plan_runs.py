@@ -12,7 +12,10 @@ strategy records again, diagnoses all runs so far, and goes on until the set has
 - ``d-optimal``: of the programmes that ``plan`` tries the one with the largest determinant of the
   information of all runs on all values of all members.
 
-Counted are runs, at most ``--most``; one without load in its file has no choice of it.
+Counted are runs, at most ``--most``; one without load in its file has no choice of it. A case is
+left out where no programme of ``plan`` separates the hidden effect from another member (power below
+0.2), as friction of pulleys by their wrap and by their bearings, which differ by a factor alone;
+their number is printed.
 """
 
 from __future__ import annotations
@@ -36,6 +39,8 @@ from campaign.record import recordings, write
 from campaign.truth import Hidden, Situation
 from campaign.winch import turns_for, write_profile
 from winchkit.arrays import Array
+from winchkit.diagnosis.design.discrimination import weights_of
+from winchkit.diagnosis.design.plan import inseparable, offers
 from winchkit.diagnosis.design.programmes import (
     CandidateProgramme,
     candidates,
@@ -216,8 +221,25 @@ def _programmes(runs: Sequence[Situation]) -> tuple[int, ...]:
     return tuple(next(i for i, other in enumerate(runs) if other is run) for run in runs)
 
 
+def is_separable(scene: Scene, answer: WinchAnswer) -> bool:
+    """Whether some programme separates the hidden effect from each other member of the set."""
+    terms = {term.effect.id: term for pair in answer.pairs for term in pair}
+    truth = terms.pop(scene.truth)
+    pairs, regression = [(truth, other) for other in terms.values()], answer.engine.regression
+    found = offers(
+        regression,
+        pairs,
+        weights_of(regression, answer.result.noise),
+        [],
+        threshold=answer.threshold,
+        operating_range=range_of_limits(regression.dataset, scene.limits),
+    )
+    return not inseparable(found, pairs)
+
+
 def played(seed: int, index: int, most: int) -> list[Outcome] | None:
-    """Every strategy on the case of a number; None where its diagnosis names no set."""
+    """Every strategy on the case of a number, none where no programme separates; None where its
+    diagnosis names no set."""
     random = np.random.default_rng([seed, index])
     scene = scene_of(random)
     if scene is None:
@@ -236,6 +258,8 @@ def played(seed: int, index: int, most: int) -> list[Outcome] | None:
                     len(left) < 2 or scene.truth not in left or not answer.pairs
                 ):
                     return None
+                if now is scene and not out and not is_separable(scene, answer):
+                    return []
                 done = len(now.runs) - len(scene.runs)
                 if len(left) < 2 or done >= most or not answer.pairs:
                     out.append(Outcome(name, done, left, scene.truth in left[:1]))
@@ -254,6 +278,7 @@ def main_of(arguments: Sequence[str]) -> int:
     parser.add_argument("--json", action="store_true", help="the means alone")
     options = parser.parse_args(arguments)
     found: list[list[Outcome]] = []
+    equal = 0
     for index in range(_ATTEMPTS * options.cases):
         if len(found) == options.cases:
             break
@@ -262,11 +287,12 @@ def main_of(arguments: Sequence[str]) -> int:
         except WinchkitError as error:
             print(f"case {index}: {error}", file=sys.stderr)
             continue
-        if case is not None:
+        equal += case == []
+        if case:
             found.append(case)
             if not options.json:
                 print(json.dumps([index, *(asdict(outcome) for outcome in case)]), flush=True)
-    print(json.dumps({name: means(found, name) for name in STRATEGIES}, indent=2))
+    print(json.dumps({"not separable": equal, **{name: means(found, name) for name in STRATEGIES}}))
     return 0
 
 

@@ -108,6 +108,8 @@ class Judged:
     """Those of them that are named, alone or in a set, certain or not."""
     wrong: int
     """Names, alone or in a set, that no hidden effect bears."""
+    names: int
+    """Names that the answer has in all."""
     before: float
     """Error of the declared machine on the held-out run over the noise."""
     after: float
@@ -139,6 +141,7 @@ def score(truths: Path, answers: Path, cases: int | None = None) -> list[Judged]
                 hidden=len(right),
                 found=sum(any(names & one for one in named) for names in right),
                 wrong=sum(not one & tolerated.union(*right) for one in named),
+                names=sum(map(len, named)),
                 before=before,
                 after=after,
                 seconds=answer.seconds,
@@ -158,6 +161,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
             **{word: counts[word] for word in WORDS},
             "found": f"{sum(one.found for one in some)} of {sum(one.hidden for one in some)}",
             "wrong names": sum(one.wrong for one in some),
+            "names": sum(one.names for one in some),
             "before": float(np.median([one.before for one in some])),
             "after": float(np.median(after)),
             "after, 90 %": float(np.quantile(after, 0.9)),
@@ -172,7 +176,7 @@ def summary(judged: Sequence[Judged]) -> dict[str, Any]:
 
 def table(found: Mapping[str, Mapping[str, Any]]) -> str:
     """One line for each entrant, as Markdown."""
-    columns = [*WORDS, "found", "wrong names", "before", "after", "after, 90 %", "seconds"]
+    columns = [*WORDS, "found", "names", "wrong names", "before", "after", "after, 90 %", "seconds"]
     lines = ["| entrant | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for entrant, figures in found.items():
         cells = [

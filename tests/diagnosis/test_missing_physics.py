@@ -202,6 +202,7 @@ def test_the_readmes_commands_write_and_score(
     assert main(["score", str(tmp_path / "d"), "--json"]) == 0
     first, second = json.loads(capsys.readouterr().out)["cases"]["mine"]
     assert first["after"] == 0
+    assert first["names"] == len(given["names"])
     assert second["word"] == "no answer"
     assert second["after"] == second["before"] > 0.9
     held = (tmp_path / "d" / "cases" / "case-001" / "held_out.csv").read_text().splitlines()

@@ -180,7 +180,9 @@ def test_the_compiled_header_is_the_line(tmp_path: Path, drum: str) -> None:
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 @pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.campaign)])
 def test_random_states_differ_by_rounding_only(tmp_path: Path, count: int) -> None:
-    """Friction with memory, elongation, a layered drum; double to 1e-12, float to 1e-5."""
+    """Friction with memory, elongation, a layered drum; double to 1e-12, float to 1e-5 but for one
+    state in 10,000: where the motor turns by milliradians, friction with memory takes the
+    difference of two rounded lengths."""
     profile = machine(tmp_path, "archimedean")
     names = ("pulley-dahl", "motor-dahl", "cable-elongation-linear", "cable-creep",
              "drum-eccentricity", "motor-viscous", "rotor-inertia", "cell-gain")  # fmt: skip
@@ -188,9 +190,12 @@ def test_random_states_differ_by_rounding_only(tmp_path: Path, count: int) -> No
     states = random_states(count, 2)
     outputs, _ = by_c(tmp_path, profile, terms, states)
     assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-12
-    states = random_states(200, 3).astype(np.float32).astype(float)
+    states = random_states(count, 3).astype(np.float32).astype(float)
     outputs, _ = by_c(tmp_path, profile, terms, states, "float")
-    assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-5
+    expected = predicted(profile, terms, states)
+    errors = np.abs(outputs - expected) / np.max(np.abs(expected), axis=0)
+    assert np.max(errors) < 1e-4
+    assert np.mean(errors > 1e-5) < 1e-4
 
 
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")

@@ -10,7 +10,7 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.sanity import caveats, unrelated
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
-from winchkit.diagnosis.design.discrimination import next_runs
+from winchkit.diagnosis.design.discrimination import next_runs, weights_of
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
@@ -381,7 +381,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
             {name: output for name, output in outputs.items() if name in known.deciding}
         ),
         where=where if verdict != "adequate" else (),
-        next_runs=(*repeat, *next_runs(regression, pairs, noise.rms)),
+        next_runs=(*repeat, *next_runs(regression, pairs, weights_of(regression, noise))),
         notes=(
             *dataset.notes,
             *missing_excitation(regression),

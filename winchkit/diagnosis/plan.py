@@ -8,6 +8,7 @@ from typing import Any, overload
 from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.design.discrimination import weights_of
 from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
 from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
@@ -76,8 +77,9 @@ def plan(
 ) -> Plan:
     """Propose the next motion programme after a diagnosis, or the next poses of a robot.
 
-    Programmes are simulated on the nominal model with the noise of the runs; those that separate
-    effects that the runs cannot distinguish come first, then those that make effects detectable.
+    Programmes are simulated on the nominal model with the noise of the runs. The first one belongs
+    to the shortest set of runs that separates all effects that the runs cannot distinguish; then
+    come those that separate most of them, or make effects detectable.
 
     Parameters
     ----------
@@ -103,15 +105,15 @@ def plan(
         return poses
     require_type(answer, WinchAnswer, "answer")
     assert isinstance(answer, WinchAnswer), "just required"
-    regression, noise = answer.engine.regression, answer.result.noise.rms
+    regression, noise = answer.engine.regression, answer.result.noise
     dataset = regression.dataset
     allowed = range_of_runs(dataset) if limits is None else range_of_limits(dataset, limits)
     effects = list((catalogue or load_catalogue()).of_winches())
-    repeats = 1 if answer.result.noise.from_repeats else 2
+    repeats = 1 if noise.from_repeats else 2
     found = offers(
         regression,
         answer.pairs,
-        noise,
+        weights_of(regression, noise),
         effects,
         threshold=answer.threshold,
         repeats=repeats,

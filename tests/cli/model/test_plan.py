@@ -55,7 +55,7 @@ def test_the_plan_is_a_programme_that_distinguishes_them(fat: list[Path], tmp_pa
     assert programme.repeat == 1, "the runs so far have repeats"
     reached = [step.to for step in programme.step if step.to is not None]
     assert min(reached) == pytest.approx(1.5, abs=0.01)
-    assert max(reached) == pytest.approx(2.8, abs=0.01)
+    assert 1.6 < max(reached) < 2.81, "the range of the runs"
     assert invoke("check", next_file).exit_code == 0
 
 

@@ -7,18 +7,25 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.stats import f, norm
+from scipy.stats import f, norm, t
 
-from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, white, with_channel
 from winchkit.cli.model.plan import _silent
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
-from winchkit.diagnosis.design.discrimination import information_of, next_runs, power_of, separation
-from winchkit.diagnosis.design.plan import inseparable
+from winchkit.diagnosis.design.discrimination import (
+    information_of,
+    next_runs,
+    power_of,
+    separation,
+    weights_of,
+)
+from winchkit.diagnosis.design.plan import _fewest_runs, inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, candidates, range_of_runs
 from winchkit.diagnosis.plan import WinchPlan
+from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
 from winchkit.diagnosis.search import selection_engine
@@ -48,7 +55,7 @@ def offers(first: str, second: str, noise: float = 1.0, warm: bool = False) -> t
     terms = {"cable-elongation-linear": ROPE, "frame-compliance": FRAME}
     pair = tuple(terms.get(name) or _usual(name) for name in (first, second))
     sizes = {output: noise * size for output, size in NOISE.items()}
-    return next_runs(TimeSeriesRegression(dataset(warm=warm)), [(pair[0], pair[1])], sizes)
+    return next_runs(TimeSeriesRegression(dataset(warm=warm)), [(pair[0], pair[1])], white(sizes))
 
 
 def _usual(effect_id: str) -> object:
@@ -56,8 +63,29 @@ def _usual(effect_id: str) -> object:
     return term(effect_id, **{p.name: p.typical for p in parameters if p.role == "amplitude"})
 
 
+def test_a_further_run_has_the_noise_of_the_diagnosis_per_frequency() -> None:
+    """Of half the rate a coefficient has half the variance; few degrees of freedom weigh less."""
+    fast, slow = (
+        TimeSeriesRegression(prepare([made(ride=Ride(400, rate))], GROOVED)) for rate in (50, 25)
+    )
+    count = len(fast.bands)
+    for dof, limit in ((np.inf, 9.0), (4.0, t.ppf(739 / 740, 4.0) ** 2)):
+        noise = BandNoise(np.full(count, 0.04), np.full(count, dof), {}, from_repeats=True)
+        weights = weights_of(fast, noise)
+        assert weights(fast) == pytest.approx(5 * np.sqrt(9 / limit), rel=1e-3)
+        assert weights(slow) == pytest.approx(5 * np.sqrt(2 * 9 / limit), rel=1e-3)
+
+
+def test_the_first_run_belongs_to_the_shortest_set_that_separates_all_pairs() -> None:
+    """Two pairs: one programme shows the first at once, the other both within two runs."""
+    strengths, alike = np.array([[1000.0, 0.0], [9.2, 9.2]]), np.array([5.0, 5.0])
+    assert _fewest_runs(strengths, alike) == pytest.approx([0.0, 2.0], abs=0.02)
+    assert _fewest_runs(strengths[:, :1], alike) == pytest.approx([1.0, 0.0])
+    assert not _fewest_runs(np.full((2, 1), 0.1), alike).any()
+
+
 def test_nothing_to_separate_needs_no_run() -> None:
-    assert next_runs(TimeSeriesRegression(dataset()), [], NOISE) == ()
+    assert next_runs(TimeSeriesRegression(dataset()), [], white(NOISE)) == ()
 
 
 def test_cable_and_frame_are_distinguished_by_loads_over_the_stroke() -> None:
@@ -75,12 +103,12 @@ def test_a_plan_offers_what_a_diagnosis_could_not_name_yet() -> None:
     """λ of 16 is no chance, but too little to be named among forty: twice the load shows more."""
     regression = TimeSeriesRegression(dataset())
     frame = [CATALOGUE["frame-compliance"]]
-    strength = separation(regression, _usual("frame-compliance"), None, NOISE)
+    strength = separation(regression, _usual("frame-compliance"), None, white(NOISE))
     noise = {output: size * np.sqrt(strength / 16) for output, size in NOISE.items()}
     for threshold, shown in ((BAR, ("frame-compliance",)), (DetectionThreshold(0.0, 3.84), ())):
         shows = {
             o.kind.name: o.shows
-            for o in plan_offers(regression, [], noise, frame, threshold=threshold)
+            for o in plan_offers(regression, [], white(noise), frame, threshold=threshold)
         }
         assert shows["full stroke, twice the load"] == shown
     assert BAR.power((np.sqrt(BAR.required_ss(1)) + norm.ppf(0.9)) ** 2, 1) == pytest.approx(
@@ -103,11 +131,12 @@ def test_warmth_is_distinguished_by_warming_up_and_by_waiting() -> None:
     pair = _usual("cable-thermal"), _usual("cable-creep")
     regression = TimeSeriesRegression(dataset(warm=True))
     power = {
-        o.kind.name: o.powers[0] for o in plan_offers(regression, [pair], sizes, [], threshold=BAR)
+        o.kind.name: o.powers[0]
+        for o in plan_offers(regression, [pair], white(sizes), [], threshold=BAR)
     }
     assert power["five lengths with holds"] > 0.9
     alone = {
-        kind.name: separation(run, pair[0], None, sizes)
+        kind.name: separation(run, pair[0], None, white(sizes))
         for kind, run in candidates(regression.dataset, range_of_runs(regression.dataset))
     }
     assert alone["full stroke, warmed up by 15 K"] > 10 * alone["full stroke"]
@@ -122,16 +151,19 @@ def test_runs_so_far_and_runs_to_come_say_what_both_say_at_once(first: str, seco
     pair = [{"cable-elongation-linear": ROPE, "frame-compliance": FRAME}.get(e) or _usual(e)
             for e in (first, second)]  # fmt: skip
     sizes = {"cable_length": NOISE["cable_length"]}
+    weights = white(sizes)
     runs = [made(int(m), noise=sizes, load_mass=m, ride=RIDE) for m in (10.0, 20.0, 35.0)]
     past, coming, both = (
         TimeSeriesRegression(prepare(part, GROOVED)) for part in (runs[:1], runs[1:], runs)
     )
-    known = information_of(past, *pair, sizes)
+    known = information_of(past, *pair, weights)
     assert known is not None
-    assert known.residual_ss == pytest.approx(separation(past, *pair, sizes))
-    grown = separation(coming, *pair, sizes, known=known)
-    assert known.residual_ss + grown == pytest.approx(separation(both, *pair, sizes), rel=1e-3)
-    assert known.residual_ss + grown >= known.residual_ss + separation(coming, *pair, sizes) - 1e-6
+    assert known.residual_ss == pytest.approx(separation(past, *pair, weights))
+    grown = separation(coming, *pair, weights, known=known)
+    assert known.residual_ss + grown == pytest.approx(separation(both, *pair, weights), rel=1e-3)
+    assert (
+        known.residual_ss + grown >= known.residual_ss + separation(coming, *pair, weights) - 1e-6
+    )
 
 
 def test_a_run_that_shows_nothing_of_a_rival_distinguishes_it_too() -> None:
@@ -151,10 +183,10 @@ def test_a_run_that_shows_nothing_of_a_rival_distinguishes_it_too() -> None:
     warming = with_channel(made(ride=ride), "temperature", drift, "degC")
     steady = with_channel(made(ride=ride), "temperature", 20.0 + 0 * drift, "degC")
     past, coming = (TimeSeriesRegression(prepare([run], GROOVED)) for run in (warming, steady))
-    alone = power_of(separation(coming, thermal, creep, NOISE))
-    known = information_of(past, thermal, creep, NOISE)
+    alone = power_of(separation(coming, thermal, creep, white(NOISE)))
+    known = information_of(past, thermal, creep, white(NOISE))
     assert alone < 0.1
-    assert power_of(separation(coming, thermal, creep, NOISE, known=known)) > 0.9
+    assert power_of(separation(coming, thermal, creep, white(NOISE), known=known)) > 0.9
 
 
 def test_what_no_motion_separates_is_left_to_the_card() -> None:
@@ -169,7 +201,7 @@ def test_the_plan_says_what_no_motion_separates() -> None:
     radius, ratio = _usual("drum-radius"), _usual("gear-ratio")
     regression = selection_engine(grooved, CATALOGUE).regression
     pairs = [(radius, ratio), (ROPE, FRAME)]
-    found = plan_offers(regression, pairs, NOISE, [], threshold=BAR)
+    found = plan_offers(regression, pairs, white(NOISE), [], threshold=BAR)
     assert inseparable(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9

@@ -92,7 +92,7 @@ def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     found = diagnose([read_run(run)], read_robot(profile))
     (pair,) = pairs_of(found.sets)
     regression, final = found.engine.regression, found.result.final.hypothesis
-    whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))
+    whole = separation(regression, *pair, lambda rows: np.ones(rows.n_rows))
     offers = pose_offers(regression, final, [pair], [SEPARATED_AT], count=3)
     assert offers[0].powers_so_far[0] == pytest.approx(power_of(whole), abs=0.01)
     assert all(len(offer.pose.position) == 3 for offer in offers)

@@ -12,6 +12,8 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.diagnosis.data.preparation import prepare
+from winchkit.diagnosis.design.discrimination import Weights
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -114,6 +116,17 @@ def engine_for(
 
 def with_channel(run: Run, name: str, values: Array, unit: str = "N") -> Run:
     return replace(run, channels={**run.channels, name: Channel(values, unit)})
+
+
+def white(noise: Mapping[str, float]) -> Weights:
+    """1/σ of every row of a regression under white noise of these rms values, per output."""
+
+    def weights(regression: Regression) -> Array:
+        rows = [np.full(s.rows.stop - s.rows.start, noise.get(s.output, np.inf))
+                for s in regression.segments]  # fmt: skip
+        return np.asarray(1 / np.concatenate(rows))
+
+    return weights
 
 
 def without(run: Run, *names: str) -> Run:

@@ -1,7 +1,8 @@
 """Discrimination of two effects by a further run, on candidate programmes that are simulated.
 
 For each candidate programme one effect is simulated; the noncentrality λ is the squared length, in
-units of the noise, that no size of the other effect can imitate there and in the runs so far.
+units of the noise, that no size of the other effect can imitate there and in the runs so far. The
+noise is that of the diagnosis, per frequency, and the power that of its limit on Δχ².
 
 References
 ----------
@@ -10,7 +11,7 @@ Hunter, W. G., Reiner, A. M. (1965). Technometrics 7, 307-323.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,14 +20,18 @@ from scipy.special import chndtr
 from winchkit.arrays import Array
 from winchkit.diagnosis.design.programmes import candidates, range_of_runs
 from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.dispersion import largest_loss
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import BandNoise, bands_at
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 
 SEPARATED_AT = 3.841
-"""95 % quantile of χ² with one degree of freedom."""
+"""95 % quantile of χ² with one degree of freedom, for poses."""
+Weights = Callable[[Regression], Array]
+"""1/σ of every row of a regression, (n_rows,)."""
 _MOST_OFFERS = 2
 """Programmes that are offered per pair; rule of thumb."""
 _WEIGHED = ", with load_mass"
@@ -47,12 +52,32 @@ class Information:
     """λ of the runs so far alone."""
 
 
+def weights_of(regression: TimeSeriesRegression, noise: BandNoise) -> Weights:
+    """1/σ at the frequencies of further runs, with the noise of the runs so far.
+
+    σ² is larger by the ratio of the limits of Δχ² for its degrees of freedom and for infinitely
+    many: the limit is then that of a known variance in every band.
+    """
+    limits = np.array([largest_loss(float(dof)) for dof in noise.dof])
+    power = noise.power * limits / largest_loss(np.inf)
+    rate = {segment.output: segment.band.rate for segment in regression.segments}
+
+    def weights(other: Regression) -> Array:
+        variance = power[bands_at(regression.bands, other)]
+        for segment in other.segments:
+            # The density of the noise is given, of which a coefficient has half the rate.
+            variance[segment.rows] *= segment.band.rate / rate[segment.output]
+        return np.asarray(1 / np.sqrt(variance))
+
+    return weights
+
+
 def next_runs(
-    regression: TimeSeriesRegression, pairs: Sequence[tuple[Term, Term]], noise: Mapping[str, float]
+    regression: TimeSeriesRegression, pairs: Sequence[tuple[Term, Term]], weights: Weights
 ) -> tuple[NextRun, ...]:
     """At most two programmes per pair that separate it best per minute, with their power.
 
-    ``noise`` is the rms per output, SI. Where no programme helps, the text is that of the effect's
+    Where no programme helps, the text is that of the effect's
     card, with NaN power.
     """
     if not pairs:
@@ -61,11 +86,11 @@ def next_runs(
     dataset = regression.dataset
     programmes = list(candidates(dataset, range_of_runs(dataset)))
     for first, second in pairs:
-        offers, known = [], information_of(regression, first, second, noise)
+        offers, known = [], information_of(regression, first, second, weights)
         for kind, programme in programmes:
             minutes = programme.dataset.recordings[0].signals.time[-1] / 60
-            noncentrality = separation(programme, first, second, noise, known=known)
-            offers.append((noncentrality / minutes, power_of(noncentrality), kind.name))
+            noncentrality = separation(programme, first, second, weights, known=known)
+            offers.append((noncentrality / minutes, power_to_separate(noncentrality), kind.name))
         # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
@@ -89,21 +114,26 @@ def power_of(noncentrality: float, required: float = SEPARATED_AT) -> float:
     return float(1 - chndtr(required, 1, max(noncentrality, 0.0)))
 
 
+def power_to_separate(noncentrality: float) -> float:
+    """Power of a run of a winch against the limit of Δχ² beyond which a rival leaves the set."""
+    return power_of(noncentrality, largest_loss(np.inf))
+
+
 def separation(
     regression: Regression,
     first: Term,
     second: Term | None,
-    noise: Mapping[str, float],
+    weights: Weights,
     *,
     known: Information | None = None,
     repeats: int = 1,
 ) -> float:
     """Noncentrality λ of the first effect where the second, if there is one, may have any size.
 
-    ``noise`` is the rms per output, SI. With ``known``, the information of the runs so far, the
+    With ``known``, the information of the runs so far, the
     result is the increase of λ by the programme: the second effect has one size there and here.
     """
-    rows = _rows(regression, first, second, noise)
+    rows = _rows(regression, first, second, weights)
     if rows is None:
         return 0.0
     own, shared_columns, signature = (np.asarray(np.sqrt(repeats) * part) for part in rows)
@@ -117,10 +147,10 @@ def separation(
 
 
 def information_of(
-    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, weights: Weights
 ) -> Information | None:
     """Information of a problem's runs on two effects; None where a prediction is not finite."""
-    rows = _rows(regression, first, second, noise)
+    rows = _rows(regression, first, second, weights)
     if rows is None:
         return None
     own, shared_columns, signature = rows
@@ -130,13 +160,11 @@ def information_of(
 
 
 def _rows(
-    regression: Regression, first: Term, second: Term | None, noise: Mapping[str, float]
+    regression: Regression, first: Term, second: Term | None, weights: Weights
 ) -> tuple[Array, Array, Array] | None:
     """Whitened columns of a run's own states, of all runs and of the first effect; None where a
     prediction is not finite."""
-    weight = np.empty(regression.n_rows)
-    for segment in regression.segments:
-        weight[segment.rows] = 1 / max(noise.get(segment.output, np.inf), 1e-300)
+    weight = weights(regression)
     signature = regression.change(Hypothesis().with_term(first, regression.n_runs)) * weight
     rival = Hypothesis()
     if second is not None:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from scipy.optimize import linprog
+
+from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.detectability import DetectionThreshold
 from winchkit.diagnosis.design.discrimination import (
     LEAST_POWER,
+    Weights,
     information_of,
-    power_of,
+    power_to_separate,
     separation,
 )
 from winchkit.diagnosis.design.programmes import (
@@ -29,8 +34,13 @@ from winchkit.schema.programme import Programme, ProgrammeStep
 
 _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
-_LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0
-"""Time of an operator to change a load, and to warm the machine, minutes."""
+_RUN_MINUTES, _LOADING_MINUTES, _WARMING_MINUTES = 10.0, 1 / 3, 20.0
+"""Time of an operator to prepare, watch and keep a run, to change a load, to warm the machine,
+minutes; rule of thumb."""
+_FULL = 18.33
+"""λ of 90 % power against a limit of 9: (3 + Φ⁻¹(0.9))²; theory."""
+_SOME = 0.1
+"""Runs of a programme from which it belongs to a set of runs that is not whole; numerical."""
 _WEIGHT_STEP = 0.5
 """Loads are proposed in steps of this, kg; convention: weights at hand."""
 
@@ -49,7 +59,7 @@ class Offer:
 
     @property
     def worth(self) -> tuple[float, ...]:
-        """Sort key, larger is better.
+        """Sort key within the shortest set of runs and of the others, larger is better.
 
         Pairs separated with at least 90 % power come first, then the sum of powers, then that per
         minute; where nothing is to be separated, effects that become detectable per minute.
@@ -80,21 +90,18 @@ class Offer:
 def offers(
     regression: TimeSeriesRegression,
     pairs: Sequence[tuple[Term, Term]],
-    noise: Mapping[str, float],
+    weights: Weights,
     effects: Sequence[Effect],
     *,
     threshold: DetectionThreshold,
     repeats: int = 2,
     operating_range: OperatingRange | None = None,
 ) -> list[Offer]:
-    """Candidate programmes within an operating range, by default that of the runs, best first.
-
-    ``noise`` is the rms per output, SI.
-    """
+    """Candidate programmes within an operating range, by default that of the runs, best first."""
     dataset = regression.dataset
     operating_range = operating_range or range_of_runs(dataset)
     usual = [
-        (term, information_of(regression, term, None, noise))
+        (term, information_of(regression, term, None, weights))
         for term in _usual(effects, regression)
     ]
     hidden = [
@@ -102,15 +109,19 @@ def offers(
         for t, known in usual
         if known and not _is_detected(threshold, t, known.residual_ss)
     ]
-    known_pairs = [(a, b, information_of(regression, a, b, noise)) for a, b in pairs]
-    out = []
+    known_pairs = [(a, b, information_of(regression, a, b, weights)) for a, b in pairs]
+    out: list[Offer] = []
+    strengths = []
     for kind, run in candidates(dataset, operating_range):
         motion = run.dataset.recordings[0].signals.time[-1] / 60
         minutes = repeats * motion + _operator_minutes(kind)
-        powers = tuple(
-            power_of(separation(run, a, b, noise, known=known, repeats=repeats))
-            for a, b, known in known_pairs
+        strengths.append(
+            [
+                separation(run, a, b, weights, known=known, repeats=repeats)
+                for a, b, known in known_pairs
+            ]
         )
+        powers = tuple(power_to_separate(strength) for strength in strengths[-1])
         shows = tuple(
             term.effect.id
             for term, known in hidden
@@ -118,11 +129,29 @@ def offers(
                 threshold,
                 term,
                 known.residual_ss
-                + separation(run, term, None, noise, known=known, repeats=repeats),
+                + separation(run, term, None, weights, known=known, repeats=repeats),
             )
         )
         out.append(Offer(kind, minutes, powers, shows))
-    return sorted(out, key=lambda offer: offer.worth, reverse=True)
+    minutes = np.array([_RUN_MINUTES + offer.minutes for offer in out])
+    chosen = _fewest_runs(np.array(strengths), minutes) >= _SOME
+    order = sorted(range(len(out)), key=lambda i: (chosen[i], out[i].worth), reverse=True)
+    return [out[i] for i in order]
+
+
+def _fewest_runs(strengths: Array, minutes: Array) -> Array:
+    """Runs of each programme that together separate every pair in the least time.
+
+    ``strengths`` are λ, (n_programmes, n_pairs). A linear programme: the shares of the λ that a
+    pair needs, at most one each, add up to one of every pair that some run separates.
+    """
+    wanted = [p for p in strengths.T if power_to_separate(float(np.max(p))) >= LEAST_POWER]
+    if not wanted:
+        return np.zeros(len(strengths))
+    shares = np.minimum(np.array(wanted) / _FULL, 1.0)
+    found = linprog(minutes, A_ub=-shares, b_ub=-np.ones(len(shares)))
+    assert found.x is not None, "enough runs of each programme separate every pair that is wanted"
+    return np.asarray(found.x)
 
 
 def _is_detected(threshold: DetectionThreshold, term: Term, noncentrality: float) -> bool:

@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.regression.base import Coarse
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.regression.noise import BandNoise, bands_at
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.derivatives import SamplingTimes
 from winchkit.model.line import Motion
@@ -60,10 +60,10 @@ class CoarseTimeSeries(Coarse):
         self, whole: TimeSeriesRegression, regression: TimeSeriesRegression, chosen: list[int]
     ) -> None:
         super().__init__(regression)
-        self._whole, self._chosen = whole, chosen
+        self._chosen = chosen
         first = {run: group.runs[0] for group in whole.dataset.repeats for run in group.runs}
         self._place = [chosen.index(first[run]) for run in range(whole.n_runs)]
-        self._band_of_row = self._bands_of_whole()
+        self._band_of_row = bands_at(whole.bands, regression)
 
     def reduced(self, hypothesis: Hypothesis) -> Hypothesis:
         """The hypothesis with the initial states of the chosen runs."""
@@ -89,18 +89,6 @@ class CoarseTimeSeries(Coarse):
     def inverse_sigma(self, noise: BandNoise) -> Array:
         """1/σ of every row of the coarse regression, from the whole one's bands."""
         return np.asarray(1 / np.sqrt(noise.power[self._band_of_row]))
-
-    def _bands_of_whole(self) -> Any:
-        """Band of the whole regression that holds the frequency of every coarse row."""
-        ids = np.zeros(self.regression.n_rows, dtype=np.intp)
-        bands = self._whole.bands
-        for segment in self.regression.segments:
-            own = [index for index, band in enumerate(bands) if band[0] == segment.output]
-            edges = [bands[index][1] for index in own[1:]]
-            ids[segment.rows] = own[0] + np.searchsorted(
-                edges, segment.band.frequency, side="right"
-            )
-        return ids
 
 
 def _subsampled(recording: Recording, step: int) -> Recording:

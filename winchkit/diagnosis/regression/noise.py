@@ -71,6 +71,16 @@ class BandNoise:
         return out
 
 
+def bands_at(bands: Sequence[tuple[str, float, float]], other: Regression) -> NDArray[np.intp]:
+    """The band that holds the frequency of every row of another regression, (n_rows,)."""
+    ids = np.zeros(other.n_rows, dtype=np.intp)
+    for segment in other.segments:
+        own = [index for index, band in enumerate(bands) if band[0] == segment.output]
+        edges = [bands[index][1] for index in own[1:]]
+        ids[segment.rows] = own[0] + np.searchsorted(edges, segment.band.frequency, side="right")
+    return ids
+
+
 @dataclass(frozen=True)
 class ReplicateContrasts:
     """Differences and means of repeated runs, in frequency, with their noise bands and the shares
