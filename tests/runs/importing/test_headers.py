@@ -120,3 +120,8 @@ def test_remarks_may_stand_between_names_and_numbers(tmp_path: Path) -> None:
     head = "Recorder\nTime [ms],Angle [deg],Torque [Nm]\nT0 = 11.05.2023 10:11:12\n\n"
     found = used(tmp_path / "recorder.csv", head + rows(1, 2))
     assert (found["time"].unit, found["motor_torque"].unit) == ("ms", "N m")
+
+
+def test_the_unit_of_a_row_counts_before_that_of_a_name(tmp_path: Path) -> None:
+    found = used(tmp_path / "axis.csv", "t_s,pos_m,F_N\nms,mm,N\n" + rows(1, 2))
+    assert (found["time"].factor, found["position"].factor) == (1e-3, 1e-3)
