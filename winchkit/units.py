@@ -53,6 +53,8 @@ UNITS: dict[str, dict[str, float]] = {
     "temperature difference": {"K": 1.0, "degC": 1.0},
     "temperature drift": {"K/h": 1.0, "K/min": 60.0, "K/s": 3600.0},
     "ratio": {"1": 1.0, "%": 1e-2, "ppm": 1e-6},
+    "number": {"1": 1.0},
+    "number per second": {"1": 1.0},
 }
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
 _ZERO_CELSIUS = 273.15
@@ -72,12 +74,28 @@ def dimension_of(unit: str) -> str | None:
 def factor(unit: str, dimension: str) -> float:
     """SI value of one ``unit``; raises UsageError with the valid units."""
     table = UNITS[dimension]
-    if unit not in table:
-        raise UsageError(
-            f"unknown {dimension} unit '{unit}'; use one of {', '.join(table)}"
-            + suggest(unit, list(table))
-        )
-    return table[unit]
+    if unit in table:
+        return table[unit]
+    other = dimension_of(unit)
+    if other is None:
+        fault = f"unknown{'' if is_bare(dimension) else f' {dimension}'} unit '{unit}'"
+    else:
+        fault = f"'{unit}' is a unit of {other}"
+        fault += "" if is_bare(dimension) else f", not of {dimension}"
+    raise UsageError(f"{fault}; {_written(dimension)}" + suggest(unit, list(table)))
+
+
+def is_bare(dimension: str) -> bool:
+    """Whether values of a dimension may be written without a unit."""
+    return "1" in UNITS[dimension]
+
+
+def _written(dimension: str) -> str:
+    """What to write for a value of a dimension."""
+    units = ", ".join(unit for unit in UNITS[dimension] if unit != "1")
+    if not is_bare(dimension):
+        return f"use one of {units}"
+    return f"write {article(dimension)} without a unit" + (f", or in {units}" if units else "")
 
 
 def convert(value: float, unit: str, dimension: str) -> float:
@@ -95,20 +113,21 @@ def number_and_unit(text: str) -> tuple[float, str] | None:
 def parse(text: object, dimension: str) -> float:
     """Read ``"60 mm"`` as an SI float; a bare number is refused unless it has no dimension."""
     if isinstance(text, int | float) and not isinstance(text, bool):
-        if dimension == "ratio":
+        if is_bare(dimension):
             return float(text)
         si = next(iter(UNITS[dimension]))
         raise UsageError(f'{text} has no unit; write {article(dimension)} as "{text} {si}"')
+    with_unit = "" if is_bare(dimension) else " with its unit"
     if not isinstance(text, str):
-        raise UsageError(f"expected {article(dimension)} with its unit, not {type(text).__name__}")
+        raise UsageError(f"expected {article(dimension)}{with_unit}, not {type(text).__name__}")
     found = number_and_unit(text)
     if found is None or found[1].startswith(","):
         is_comma = "," in text and "." not in text
         hint = f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
-        raise UsageError(f"'{text}' is not a number with its unit{hint}")
+        raise UsageError(f"'{text}' is not a number{with_unit}{hint}")
     value, unit = found
-    if not unit and dimension != "ratio":
-        raise UsageError(f"'{text}' has no unit; use one of {', '.join(UNITS[dimension])}")
+    if not unit and not is_bare(dimension):
+        raise UsageError(f"'{text}' has no unit; {_written(dimension)}")
     return convert(value, unit or "1", dimension)
 
 

@@ -22,9 +22,9 @@ _DEG = _TURN / 360
 _RATED = 2.4
 _COUNTS = 4096
 _NAMES = {
-    "motor_angle": ("Position", "Motor angle", "ActPos", "theta", "Winkel", "encoder"),
-    "motor_velocity": ("Velocity", "speed", "ActVel", "omega", "Drehzahl"),
-    "motor_torque": ("Torque", "Drehmoment", "tau", "ActTorque", "couple"),
+    "motor_angle": ("Position", "Motor angle", "ActPos", "theta", "Winkel", "encoder", "q_m"),
+    "motor_velocity": ("Velocity", "speed", "ActVel", "omega", "Drehzahl", "omega_m"),
+    "motor_torque": ("Torque", "Drehmoment", "tau", "ActTorque", "couple", "tau_m"),
     "position": ("Position", "Displacement", "Weg", "stroke", "pos"),
     "velocity": ("Velocity", "speed", "Geschwindigkeit"),
     "force": ("Force", "Kraft", "Axial Force"),

@@ -84,7 +84,7 @@ def test_an_attached_client_is_refused_in_the_same_words(
     rig: Rig, station: RemoteStation, call: str
 ) -> None:
     for value in NO_NUMBERS:
-        words = r"pass a number|is not a|is more than|has no unit|unknown force unit"
+        words = r"pass a number|is not a|is more than|has no unit|not of force"
         with pytest.raises(UsageError, match=words):
             ATTACHED[call](station, value)
     assert unmoved(rig)

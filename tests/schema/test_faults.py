@@ -84,7 +84,7 @@ def test_every_fault_in_one_go(file: Path) -> None:
         ("ratio = 20", "ratio = 20\nefficiency = 1.2", 10, "gearbox.efficiency", "at most 1"),
         ('"60 mm"', '"inf mm"', 6, "drum.winding_radius", "finite"),
         ('"60 mm"', '"nan mm"', 6, "drum.winding_radius", "not a number"),
-        ('"60 mm"', '"60 kg"', 6, "drum.winding_radius", "length unit 'kg'"),
+        ('"60 mm"', '"60 kg"', 6, "drum.winding_radius", "unit of mass, not of length"),
         ('"60 mm"', '["60 mm"]', 6, "drum.winding_radius", "list"),
         ('name = "w"', "name = 3", 3, "name", "text in quotes"),
         ('name = "w"', "pulley = 3", 3, "pulley", "a list"),

@@ -8,12 +8,13 @@ from datetime import date, datetime
 from typing import Annotated, Literal
 
 from winchkit.schema.quantity import (
-    Count,
     Force,
     Length,
     Marker,
+    NonNegativeRatio,
     Number,
     PositiveForce,
+    Ratio,
     Temperature,
     WholeNumber,
 )
@@ -71,15 +72,15 @@ class CellCalibration(Table):
     high: PositiveForce = float("inf")
     """Lowest and highest load of the calibration."""
     residual_std: Force = 0.0
-    nonlinearity: Count = 0.0
+    nonlinearity: NonNegativeRatio = 0.0
     """Nonlinearity: largest deviation of the mean curve from its line, as a share of the span."""
-    hysteresis: Count = 0.0
+    hysteresis: NonNegativeRatio = 0.0
     """Hysteresis: largest difference between unloading and loading beyond the zero return, as a
     share of the span."""
-    zero_return: Number = 0.0
+    zero_return: Ratio = 0.0
     """Zero return: reading at the smallest load after the largest one less before it, as a share of
     the span."""
-    repeatability: Count = 0.0
+    repeatability: NonNegativeRatio = 0.0
     """Repeatability: standard deviation between series at a load, as a share of the span."""
     point: tuple[CalibrationPoint, ...] = ()
     path: str = field(default="", compare=False)

@@ -6,7 +6,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from winchkit.schema.quantity import Quantity
-from winchkit.units import UNITS, format_quantity
+from winchkit.units import UNITS, format_quantity, is_bare
 
 _DIGITS = 15
 """Significant digits: all that a number written in decimals has."""
@@ -36,6 +36,6 @@ def _value(value: Any, marker: object) -> Any:
         return _table(value)
     if isinstance(value, tuple):
         return [_value(item, marker) for item in value]
-    if isinstance(marker, Quantity) and marker.dimension != "ratio":
+    if isinstance(marker, Quantity) and not is_bare(marker.dimension):
         return format_quantity(value, next(iter(UNITS[marker.dimension])), _DIGITS)
     return float(value) if isinstance(value, float) else value

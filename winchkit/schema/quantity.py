@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from winchkit.errors import UsageError
 from winchkit.schema.plausible import check_size
-from winchkit.units import UNITS, article, parse
+from winchkit.units import UNITS, article, is_bare, parse
 
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
@@ -58,7 +58,7 @@ class Quantity(Marker):
     def read(self, raw: object) -> float:
         """Convert a value of a file to SI; raises UsageError with the reason."""
         value = parse(raw, self.dimension)
-        unit = next(iter(UNITS[self.dimension])) if self.dimension != "ratio" else ""
+        unit = "" if is_bare(self.dimension) else next(iter(UNITS[self.dimension]))
         reason = f": {self.why}" if self.why else ""
         if value < self.low or (self.above and value == self.low):
             word = "above" if self.above else "at least"
@@ -70,8 +70,8 @@ class Quantity(Marker):
     @property
     def wanted(self) -> str:
         """Description of the expected value."""
-        if self.dimension == "ratio":
-            return "a number"
+        if is_bare(self.dimension):
+            return "a number" if self.dimension == "ratio" else article(self.dimension)
         unit = next(iter(UNITS[self.dimension]))
         return f'{article(self.dimension)} with its unit, such as "1 {unit}"'
 
@@ -147,8 +147,12 @@ PositiveMass = Annotated[float, Quantity("mass", 0.0, above=True)]
 LinearDensity = Annotated[float, Quantity("mass per length", 0.0)]
 Inertia = Annotated[float, Quantity("inertia", 0.0)]
 Temperature = Annotated[float, Quantity("temperature")]
-Number = Annotated[float, Quantity("ratio")]
-PositiveNumber = Annotated[float, Quantity("ratio", 0.0, above=True)]
-Count = Annotated[float, Quantity("ratio", 0.0)]
+Number = Annotated[float, Quantity("number")]
+PositiveNumber = Annotated[float, Quantity("number", 0.0, above=True)]
+PositiveRate = Annotated[float, Quantity("number per second", 0.0, above=True)]
+Count = Annotated[float, Quantity("number", 0.0)]
+Ratio = Annotated[float, Quantity("ratio")]
+NonNegativeRatio = Annotated[float, Quantity("ratio", 0.0)]
+PositiveRatio = Annotated[float, Quantity("ratio", 0.0, above=True)]
 WholeNumber = Annotated[int, Whole(1)]
 Flag = Annotated[bool, Truth()]

@@ -55,7 +55,7 @@ def test_a_tare_in_kilograms_is_refused_at_its_place(tmp_path: Path) -> None:
     path = tmp_path / "b.tares.toml"
     head = 'schema = 1\nkind = "tares"\nname = "b"\n[tare."A.cell"]\n'
     path.write_text(head + 'value = "3 kg"\n')
-    with pytest.raises(FileError, match=r"toml:5: tare\.A\.cell\.value: unknown force unit 'kg'"):
+    with pytest.raises(FileError, match=r"toml:5: tare.*'kg' is a unit of mass, not of force"):
         read_tares(path)
 
 

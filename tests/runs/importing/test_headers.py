@@ -59,3 +59,69 @@ def test_titles_of_the_rows_of_a_header_may_stand_above_the_times(
     assert (found["time"].unit, found["time"].confidence) == ("s", "named")
     assert found["motor_angle"].factor == pytest.approx(math.pi / 180)
     assert found["tension"].factor == 1.0
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "time,q_m,omega_m,tau_m\n",
+        "time,q_m,omega_m,tau_m\ns,rad,rad/s,Nm\n",
+        "time [s],theta_m [rad],dq_s [rad/s],tau_m [Nm]\n",
+    ],
+)
+def test_a_length_or_a_time_behind_another_quantity_is_an_index(head: str, tmp_path: Path) -> None:
+    """``tau_m`` is the torque of a motor: it was the cable length in metres."""
+    found = used(tmp_path / "joint.csv", head + rows(1, 2, 3))
+    assert set(found) == {"time", "motor_angle", "motor_velocity", "motor_torque"}
+    assert found["motor_torque"].source == "tau_m"
+    assert found["motor_torque"].factor == 1
+
+
+def test_an_index_behind_an_unknown_name_is_no_evidence_of_a_length(tmp_path: Path) -> None:
+    found = used(tmp_path / "joint.csv", "time_s,q_rad,i_m\n" + rows(1, 2))
+    assert set(found) == {"time", "motor_angle"}
+    lengths = used(tmp_path / "axis.csv", "time_s,pos_m,force_N\n" + rows(1, 2))
+    assert lengths["position"].factor == 1
+
+
+def test_titles_of_rows_may_stand_beside_an_empty_column(tmp_path: Path) -> None:
+    """ControlDesk: the path, the name and the unit of each channel, and a title of the numbers."""
+    head = (
+        '"descriptor","Capture"\n\npath,,"Model Root/q","Model Root/tau"\n'
+        "trace_name,time,q,tau_m\nunit,ms,deg,Nm\ntrace_values,,,\n"
+    )
+    text = "".join(f",{line}\n" for line in rows(1, 2).splitlines())
+    found = used(tmp_path / "capture.csv", head + text)
+    assert {item.source: item.unit for item in found.values()} == {
+        "time": "ms",
+        "q": "deg",
+        "tau_m": "N m",
+    }
+
+
+def test_rows_of_a_header_beside_an_empty_column_are_no_numbers(tmp_path: Path) -> None:
+    """An oscilloscope's: counts and sizes stand in the rows above the numbers."""
+    head = (
+        "Model,DLM\nTraceName,Speed,Torque\nVUnit,rpm,Nm\nHResolution,1.0e-2\nHUnit,s,s\n"
+        "DisplayPointNo.,200,200\n"
+    )
+    text = "".join(f",{20 + k % 9},{k % 7}\n" for k in range(COUNT))
+    path = tmp_path / "scope.csv"
+    path.write_text(head + text)
+    table = read_table(path)
+    assert table.interval == 0.01
+    assert {len(column) for column in table.columns} == {COUNT}
+    assert {"Speed": "rpm", "Torque": "Nm"}.items() <= {
+        c.name: c.unit for c in table.columns
+    }.items()
+
+
+def test_remarks_may_stand_between_names_and_numbers(tmp_path: Path) -> None:
+    head = "Recorder\nTime [ms],Angle [deg],Torque [Nm]\nT0 = 11.05.2023 10:11:12\n\n"
+    found = used(tmp_path / "recorder.csv", head + rows(1, 2))
+    assert (found["time"].unit, found["motor_torque"].unit) == ("ms", "N m")
+
+
+def test_the_unit_of_a_row_counts_before_that_of_a_name(tmp_path: Path) -> None:
+    found = used(tmp_path / "axis.csv", "t_s,pos_m,F_N\nms,mm,N\n" + rows(1, 2))
+    assert (found["time"].factor, found["position"].factor) == (1e-3, 1e-3)

@@ -169,3 +169,18 @@ def test_rows_beside_the_names_of_their_cells_are_a_table(tmp_path: Path) -> Non
     assert [item.name for item in columns] == names
     assert columns[1].values.tolist() == TRUE.tolist()
     assert np.count_nonzero(np.isfinite(columns[2].values)) == 100
+
+
+@pytest.mark.parametrize(("title", "digits"), [("Millisekunden", 3), ("ms", 3), ("usec", 6)])
+def test_a_fraction_beside_times_of_day(tmp_path: Path, title: str, digits: int) -> None:
+    """A controller's log: 594 of 600 stamps repeated the one before, and the file was refused."""
+    path = tmp_path / "log.csv"
+    lines = [f"Datum;Uhrzeit;{title};Istposition [deg]"]
+    for k in range(400):
+        whole, part = divmod(50_912_000 + 7_000 * k, 10**6)
+        cells = (f"04.03.2025;11:59:{whole:02d}", part // 10 ** (6 - digits), f"{k / 9:.3f}")
+        lines.append(";".join(map(str, cells)))
+    path.write_text("\n".join(lines) + "\n")
+    table = guess_columns(read_table(path))
+    run = run_of(streams_of(table), {})
+    assert np.allclose(np.diff(run.time), 7e-3, atol=1e-6)

@@ -125,7 +125,7 @@ def test_overrides_of_the_profile_are_true() -> None:
     ("key", "raw", "message"),
     [
         ("drum.radius", "60 mm", "no key 'radius'"),
-        ("drum.winding_radius", "60 kg", "unknown length unit"),
+        ("drum.winding_radius", "60 kg", "unit of mass, not of length"),
         ("drum.kind", "grooved", "is not a number"),
         ("pulley.7.wrap", "1 rad", "not a position in a list of 2"),
     ],

@@ -1,7 +1,8 @@
 """Effects of a load cell that points at rest determine: zero, span, curvature, hysteresis.
 
 The difference of reading and load is a linear model of up to seven columns; all subsets whose terms
-are significant (t test, 5 %) are fitted by least squares, and that of least BIC is kept. Its terms
+are significant (t test, 5 %; those beyond a line all together and beside the line) are fitted by
+least squares, and that of least BIC is kept. Its terms
 are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and ``cell-
 hysteresis``, so that the values go into a profile, and three that depend on the order of the loads:
 a zero return (all readings of a series after its largest load), a zero shift (all readings after
@@ -49,7 +50,7 @@ _SHIFT = 5
 _LINE = (0, 1)
 """Terms of a straight line, which readings in a unit of their own have by definition."""
 _SIGNIFICANT = 0.05
-"""Level of the t test of a term: of few points the BIC alone keeps terms of p = 0.26."""
+"""Level of the t test: of few points the BIC alone keeps terms of p = 0.26."""
 _ALIKE = 2.0
 """Difference of BIC below which two models are reported as a set (Raftery 1995: no evidence)."""
 _UNIT_TENSION = 500.0
@@ -140,11 +141,13 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
         _effects_of(s, values, inverse, square / (len(load) - len(s)), len(load))
         for s, (values, inverse, square) in zip(subsets, fits, strict=True)
     ]
+    beyond = [k for k in free_terms if k not in _LINE]
     bic = [
         len(load) * np.log(max(square, floor) / len(load)) + len(values) * np.log(len(load))
         if all(e.p_value < _SIGNIFICANT for e in effects if e.effect not in _names_of(forced))
+        and _are_beyond_a_line(columns, error, [k for k in s if k in beyond], len(beyond))
         else np.inf
-        for effects, (values, _, square) in zip(found, fits, strict=True)
+        for s, effects, (values, _, square) in zip(subsets, found, fits, strict=True)
     ]
     best = int(np.argmin(bic))
     kept, square = subsets[best], fits[best][2]
@@ -169,6 +172,21 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
         p_value,
         others if square > floor else (),
     )
+
+
+def _are_beyond_a_line(columns: Array, error: Array, terms: list[int], offered: int) -> bool:
+    """Whether terms are significant beside a line, as the best of those that are offered.
+
+    The level of each is that of all, divided by their number (Bonferroni).
+    """
+    both = [*_LINE, *terms]
+    free = len(error) - len(both)
+    if not terms or free < 1:
+        return not terms
+    values, inverse, square = _fit(columns[:, both], error)
+    stds = np.sqrt(square / free * np.diag(inverse))[len(_LINE) :]
+    chances = [_two_sided(v, std, free) for v, std in zip(values[len(_LINE) :], stds, strict=True)]
+    return max(chances) < _SIGNIFICANT / offered
 
 
 def _moved(load: Array, error: Array, after: Array) -> Array:

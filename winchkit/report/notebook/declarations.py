@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from winchkit.quantity_text import plain, quantity
 from winchkit.schema.profiles.winch import EffectTable
 from winchkit.schema.quantity import Quantity
-from winchkit.units import UNITS
+from winchkit.units import UNITS, is_bare
 
 _LEFT_OUT = {"name", "description", "ledger", "effect", "rules"}
 
@@ -80,6 +80,6 @@ def _unit(hint: Any) -> str:
     """SI unit of the first quantity within an annotation; empty without one."""
     if get_origin(hint) is Annotated:
         for mark in hint.__metadata__:
-            if isinstance(mark, Quantity) and mark.dimension != "ratio":
+            if isinstance(mark, Quantity) and not is_bare(mark.dimension):
                 return next(iter(UNITS[mark.dimension]))
     return next((unit for inner in get_args(hint) if (unit := _unit(inner))), "")

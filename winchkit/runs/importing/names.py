@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from winchkit.runs.columns import column_dimension
-from winchkit.schema.linear_axis import ROTARY
+from winchkit.runs.importing.units.spelling import read_unit, split_unit
+from winchkit.schema.linear_axis import CHANNELS, ROTARY
 
 IGNORED = ""
 """Channel of a set point, an error, a status word: known and not used."""
@@ -244,6 +245,30 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> NamedChannel | None:
             if text and (found := pattern.search(text)):
                 return NamedChannel(channel, rank, found[0])
     return None
+
+
+def name_and_unit(text: str, given: str = "") -> tuple[str, str]:
+    """Name and unit of a cell, whose unit in a row of its own, if any, is ``given``.
+
+    A length or a time behind the name of another quantity is an index: ``tau_m`` is the torque of
+    a motor, ``speed_s`` a smoothed speed. So is one beside another unit in the row.
+    """
+    name, unit = split_unit(text)
+    known, stated = read_unit(unit), read_unit(given)
+    is_behind = text.strip() == f"{name}_{unit}"
+    if not is_behind or known is None or known.dimension not in {"length", "time"}:
+        return name, unit or (given if stated else "")
+    if stated is not None:
+        return (name if stated.dimension == known.dimension else text.strip()), given
+    meaning = meaning_of(name)
+    if meaning is None:
+        is_index = unit == "m"  # of a motor, or measured: no evidence of a length
+    else:
+        # A position may be a length; what is called an angle is none.
+        linear = CHANNELS.get(meaning.channel, "") if meaning.rank > 1 else ""
+        fitting = {column_dimension(meaning.channel), column_dimension(linear)}
+        is_index = bool(meaning.channel) and known.dimension not in fitting
+    return (text.strip(), "") if is_index else (name, unit)
 
 
 def _axis_of(labels: tuple[str, ...], words: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from winchkit.arrays import Array
 from winchkit.quantity_text import quantity
@@ -25,6 +26,8 @@ _LONGEST = 10
 """Samples at a level that noise leaves by chance at once; with `_TIMES` usual stretches the least
 of a saturation. Rule of thumb."""
 _TIMES = 3
+_CHANCE = 1e-2
+"""Chance of the samples at the largest level, if that is a bend, below which they are a limit."""
 _DITHERED = 12
 """Longest repetition elsewhere of a channel whose noise is not small against its resolution."""
 _LEAST_LEVELS = 8
@@ -48,8 +51,9 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
     """An extreme at which values of resolution ``step`` are cut off; value: share of samples there.
 
     Continuous noise has no two equal values: an extreme that repeats is a limit. Values of a coarse
-    resolution repeat, but three times as long as elsewhere only at a limit; with a resolution far
-    above the noise nothing can be concluded. A channel without noise may rest at its extreme, but
+    resolution repeat, but a bend is not at its last level longer than its shape allows, and values
+    repeat three times as long as elsewhere only at a limit; with a resolution far above the noise
+    nothing can be concluded. A channel without noise may rest at its extreme, but
     then approaches it slowly, and a friction jumps to it: a limit ends a slope. A force with noise
     on its slopes has it at its extreme too. An extreme of zero is that of an instrument at rest.
     """
@@ -122,12 +126,31 @@ def _is_cut_off(signal: Array, at: NDArray[np.bool_], ends: NDArray[np.bool_], s
     changing = steps[(steps != 0) & ~between]
     alternating = np.count_nonzero(changing[1:] * changing[:-1] < 0)
     is_alternating = bool(alternating > _ALTERNATING * len(changing))
-    if is_alternating and np.mean(elsewhere) < _TIES:
+    is_continuous = is_alternating and np.mean(elsewhere) < _TIES
+    if (step or not is_continuous) and _chance_of_a_bend(signal, at, step) > _CHANCE:
+        return False
+    if is_continuous:
         return True
     usual = _longest(elsewhere)
     if _longest(at) <= max(_LONGEST, _TIMES * usual):
         return False
     return (is_alternating and usual <= _DITHERED) or _ends_slopes(signal, at, step)
+
+
+def _chance_of_a_bend(signal: Array, at: NDArray[np.bool_], step: float) -> float:
+    """Chance that smooth maxima of any heights give so large a share of samples at the top level.
+
+    A parabola whose height above a level is h <= 1 step is above it for a time ~ √h, and above the
+    level below for ~ √(h + 1): the share is at most 1/√2.
+    """
+    held = at & (np.append(at[1:], False) | np.append(False, at[:-1]))
+    if 2 * np.count_nonzero(held) < np.count_nonzero(at):
+        return 1.0  # single samples of a wave with few samples a period
+    # Bends that do not reach the level are no part of it.
+    near = zip(*_stretches(signal >= signal.max() - 1.5 * step), strict=True)
+    reached = [at[begin : begin + length] for begin, length in near]
+    count, size = (sum(map(of, (part for part in reached if part.any()))) for of in (np.sum, len))
+    return float(binom.sf(count - 1, size, 2**-0.5))
 
 
 def _ends_slopes(signal: Array, at: NDArray[np.bool_], step: float) -> bool:

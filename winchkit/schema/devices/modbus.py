@@ -13,7 +13,7 @@ from winchkit.schema.quantity import (
     Flag,
     Number,
     PositiveDuration,
-    PositiveNumber,
+    PositiveRate,
     Whole,
     WholeNumber,
 )
@@ -208,7 +208,7 @@ class ModbusSpec(Table):
     """Largest number of registers in one query."""
     gap: Duration = 0.0
     """Least pause between an answer and the next query, s."""
-    rate: PositiveNumber = 100.0
+    rate: PositiveRate = 100.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
     """Age of a value when it is read, s."""

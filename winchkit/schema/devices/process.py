@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from winchkit.schema.devices.modbus import StatusMeaning, VerifiedCommand, unverified
 from winchkit.schema.devices.servo import PdoSpec
-from winchkit.schema.quantity import Duration, Number, PositiveNumber, Whole
+from winchkit.schema.quantity import Duration, Number, PositiveRate, Whole
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
@@ -43,7 +43,7 @@ class ProcessSpec(Table):
     """Status bits by meaning; any of the bits is sufficient."""
     tpdo: tuple[PdoSpec, ...] = ()
     command: Mapping[str, ProcessCommand] = field(default_factory=dict)
-    rate: PositiveNumber = 50.0
+    rate: PositiveRate = 50.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
     """Age of a value when it is sent, s."""

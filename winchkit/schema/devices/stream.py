@@ -15,6 +15,7 @@ from winchkit.schema.quantity import (
     Number,
     PositiveDuration,
     PositiveNumber,
+    PositiveRate,
     Whole,
     WholeNumber,
 )
@@ -180,7 +181,7 @@ class StreamSpec(Table):
     """Sent before the first request to another device of the line."""
     command: Mapping[str, AskSpec] = field(default_factory=dict)
     link: LinkSpec | None = None
-    rate: PositiveNumber = 100.0
+    rate: PositiveRate = 100.0
     """Conversions per second."""
     filter_delay: Duration = 0.0
     """Age of a value when it is sent, s."""

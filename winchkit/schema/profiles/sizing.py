@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from winchkit.schema.quantity import (
     Count,
+    NonNegativeRatio,
     PositiveForce,
     PositiveLength,
     PositiveNumber,
@@ -43,11 +44,11 @@ class EfficiencySpec(Table):
     gearbox: Share
     belt: Share = 1.0
     """Of one belt drive."""
-    belts: Annotated[float, Quantity("ratio", 0.0)] = 1.0
+    belts: Count = 1.0
     """Number of belt drives in series."""
     bearing: Share = 1.0
     """Of one bearing."""
-    bearings: Annotated[float, Quantity("ratio", 0.0)] = 0.0
+    bearings: Count = 0.0
     """Number of bearings."""
 
 
@@ -76,7 +77,7 @@ class WormSpec(Table):
 
     lead_angle: Annotated[float, Quantity("angle", 0.0, above=True)]
     """Rad."""
-    friction: Count
+    friction: NonNegativeRatio
     """Of the flanks."""
     starts: WholeNumber = 1
 
@@ -104,7 +105,7 @@ class DrumChoice(Table):
     """Of the groove, m."""
     full_radius: PositiveLength | None = None
     """Axis to cable centre with all cable wound, m; default is ``winding_radius`` (one layer)."""
-    dead_wraps: Annotated[float, Quantity("ratio", 2.0)] = 2.0
+    dead_wraps: Annotated[float, Quantity("number", 2.0)] = 2.0
     """Turns that never leave the drum."""
 
     def rules(self) -> Iterator[Rule]:

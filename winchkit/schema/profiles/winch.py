@@ -117,7 +117,7 @@ class GearboxSpec(Table):
     """The gearbox between motor and drum."""
 
     ratio: Annotated[
-        float, Quantity("ratio", 1e-3, 1e5, why="gearboxes of winches have 1 to some thousands")
+        float, Quantity("number", 1e-3, 1e5, why="gearboxes of winches have 1 to some thousands")
     ] = 1.0
     """Motor turns per drum turn; 1 is a direct drive."""
     direction: Literal[1, -1] = 1
@@ -141,7 +141,7 @@ class GuideSpec(Table):
 
     screw_lead: PositiveLength
     belt_ratio: Annotated[
-        float, Quantity("ratio", 1e-3, 1e3, why="belts of cable guides have some tens at most")
+        float, Quantity("number", 1e-3, 1e3, why="belts of cable guides have some tens at most")
     ] = 1.0
     """Screw turns per drum turn."""
     distance: PositiveLength = 0.4

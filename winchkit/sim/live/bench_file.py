@@ -12,7 +12,7 @@ from winchkit.catalog import Kind, find, folder
 from winchkit.regular_file import file_errors
 from winchkit.schema.bench import BenchSpec
 from winchkit.sim.physics.parameters import quantity_of
-from winchkit.units import UNITS
+from winchkit.units import UNITS, is_bare
 
 _MARK = "# written by winchkit: the bench of a simulation"
 """First line, by which a later simulation knows that it may write over the file."""
@@ -88,7 +88,7 @@ def _text(value: Any, hint: Any) -> str:
     marker = quantity_of(hint)
     if isinstance(value, float) and marker is not None:
         unit = next(iter(UNITS[marker.dimension]))
-        return repr(value) if marker.dimension == "ratio" else json.dumps(f"{value!r} {unit}")
+        return repr(value) if is_bare(marker.dimension) else json.dumps(f"{value!r} {unit}")
     return json.dumps(value)
 
 

@@ -9,10 +9,10 @@ from typing import ClassVar
 from winchkit.schema.quantity import (
     Angle,
     LinearDensity,
-    Number,
     PositiveDuration,
     PositiveForce,
-    PositiveNumber,
+    PositiveRatio,
+    Ratio,
 )
 from winchkit.sim.physics.base import Expansion, Physics, PlantState, Stiffness
 from winchkit.sim.physics.presliding import relax
@@ -80,7 +80,7 @@ class LaggingCable(Physics):
     """
 
     axial_stiffness: PositiveForce = 80e3
-    fraction: PositiveNumber = 0.1
+    fraction: PositiveRatio = 0.1
     size: ClassVar[str] = "fraction"
     _held: float = 0.0
     _before: float | None = None
@@ -108,7 +108,7 @@ class HeavyCable(Physics):
 class LoadLever(Physics):
     """The load acts through a lever that turns with the drum."""
 
-    amplitude: Number = 0.03
+    amplitude: Ratio = 0.03
     phase: Angle = 0.3
 
     def weight(self, state: PlantState) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import exp
 from typing import Annotated, ClassVar
 
-from winchkit.schema.quantity import Force, Number, PositiveDuration, PositiveForce, Quantity
+from winchkit.schema.quantity import Force, PositiveDuration, PositiveForce, Quantity, Ratio
 from winchkit.sim.physics.base import ForceDrift, Physics, PlantState, ThermalForce
 
 
@@ -15,7 +15,7 @@ from winchkit.sim.physics.base import ForceDrift, Physics, PlantState, ThermalFo
 class StretchedCell(Physics):
     """The cell's gain is wrong."""
 
-    gain_error: Number = 0.02
+    gain_error: Ratio = 0.02
 
     def cell(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)

@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar
 from winchkit.schema.quantity import (
     Angle,
     Inertia,
-    Number,
     PositiveDuration,
     PositiveNumber,
     Quantity,
+    Ratio,
     Torque,
 )
 from winchkit.sim.physics.base import (
@@ -115,7 +115,7 @@ class Cogging(Physics):
 class RippledMotor(Physics):
     """Ripple of the torque constant, a whole number of periods per motor turn."""
 
-    amplitude: Number = 0.02
+    amplitude: Ratio = 0.02
     order: PositiveNumber = 6.0
     phase: Angle = 0.3
 
@@ -192,7 +192,7 @@ class HeavyRotor(Physics):
 class WeakMotor(Physics):
     """The drive's torque constant is wrong, and its reported torque with it."""
 
-    gain_error: Number = 0.05
+    gain_error: Ratio = 0.05
 
     def torque_signal(self, state: PlantState, reading: float, dt: float) -> float:
         return reading * (1.0 + self.gain_error)

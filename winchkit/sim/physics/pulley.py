@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from math import cos, exp, sqrt
 from typing import ClassVar
 
-from winchkit.schema.quantity import Mass, Number, PositiveNumber, PositiveSpeed
+from winchkit.schema.quantity import Mass, PositiveNumber, PositiveSpeed, Ratio
 from winchkit.sim.physics.base import Physics, PlantState, Stiffness, Viscosity, winding_direction
 from winchkit.sim.physics.presliding import relax
 
@@ -29,7 +29,7 @@ def _dragged(tension: float, wrap: float, friction: float) -> float:
 class StickyPulleys(Physics):
     """Coulomb friction of the axles, odd in direction."""
 
-    friction: Number = 0.01
+    friction: Ratio = 0.01
 
     def pulley(
         self, state: PlantState, index: int, wrap: float, tension: float, dt: float
@@ -41,7 +41,7 @@ class StickyPulleys(Physics):
 class PreslidingPulleys(Physics):
     """Presliding friction (Dahl) over the cable's travel."""
 
-    friction: Number = 0.012
+    friction: Ratio = 0.012
     stiffness: Stiffness = 500.0
     shape: PositiveNumber = 1.0
     _force: dict[int, float] = field(default_factory=dict)
@@ -72,8 +72,8 @@ class ViscousPulleys(Physics):
 class CreepPulleys(Physics):
     """Coulomb friction with a higher value at low speed (Stribeck)."""
 
-    coulomb: Number = 0.008
-    static: Number = 0.03
+    coulomb: Ratio = 0.008
+    static: Ratio = 0.03
     stribeck_speed: PositiveSpeed = 0.04
     size: ClassVar[str] = "static"
 
@@ -112,9 +112,9 @@ class MaxwellPulleys(Physics):
     hysteresis*, 1966); their sum is the presliding hysteresis.
     """
 
-    friction: Number = 0.012
+    friction: Ratio = 0.012
     stiffness: Stiffness = 20000.0
-    static_excess: Number = 0.15
+    static_excess: Ratio = 0.15
     stribeck_speed: PositiveSpeed = 0.01
     drag_speed: PositiveSpeed = 5.0
     """At which the bearing drag equals the sliding force, m/s."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from winchkit.errors import FileError
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNumber, Torque
+from winchkit.schema.quantity import Angle, Duration, Length, PositiveNumber, Ratio, Torque
 from winchkit.sim.physics.base import Physics, PlantState, motor_direction
 
 _SLIP_TIME = 0.4
@@ -30,7 +30,7 @@ class FatDrum(Physics):
 class WrongRatio(Physics):
     """The gearbox has another ratio than declared."""
 
-    ratio_error: Number = 0.004
+    ratio_error: Ratio = 0.004
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
         ratio = profile.gearbox.ratio * (1 + self.ratio_error)

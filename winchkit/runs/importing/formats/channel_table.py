@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.runs.importing.formats.stamps import is_stamp
-from winchkit.runs.importing.names import meaning_of
+from winchkit.runs.importing.names import meaning_of, name_and_unit
 from winchkit.runs.importing.table import ColumnTable, FileColumn
-from winchkit.runs.importing.units.spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import split_unit
 
 _VALUE = re.compile(
     r"[_ ]*(value|val|reading|data|double|float|wert|valeur|valor|valore)s?[_ ]*", re.I
@@ -143,11 +143,10 @@ def _columns(
     parts: _Parts, channel: str, rows: NDArray[np.intp], start: int
 ) -> Iterator[FileColumn]:
     """Stamps and values of one channel, whose name begins with what all have in common."""
-    name, unit = split_unit(channel[start:])
+    given = set[str]()
     if parts.unit is not None and parts.unit.texts is not None:
         given = {parts.unit.texts[int(row)].strip() for row in rows}
-        own = given.pop() if len(given) == 1 else ""
-        unit = unit or (own if read_unit(own) else "")
+    name, unit = name_and_unit(channel[start:], given.pop() if len(given) == 1 else "")
     for clock in parts.clocks:
         yield replace(clock.at(rows), labels=(name,), group=channel)
     value = parts.value.at(rows)

@@ -12,7 +12,6 @@ from winchkit.errors import Fault, RunError
 from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import ColumnTable, readable, refuse_size
-from winchkit.runs.importing.units.spelling import split_unit
 
 _OBJECTS = (
     "has Python objects, which may hold code; load it in Python where you trust it, and write its "
@@ -36,13 +35,7 @@ def read_numpy(path: str, data: bytes) -> ColumnTable:
     if arrays is None:
         names = loaded.dtype.names
         arrays = {name: loaded[name] for name in names} if names else {"array": loaded}
-    named = {name: split_unit(name) for name in arrays}
-    return table_of_arrays(
-        path,
-        "NPZ" if data.startswith(b"PK") else "NPY",
-        {named[name][0]: value for name, value in arrays.items()},
-        units=dict(named.values()),
-    )
+    return table_of_arrays(path, "NPZ" if data.startswith(b"PK") else "NPY", arrays)
 
 
 def read_parquet(path: str, data: bytes) -> ColumnTable:
@@ -58,14 +51,13 @@ def read_parquet(path: str, data: bytes) -> ColumnTable:
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     for field, column in zip(table.schema, table.columns, strict=True):
-        plain, unit = split_unit(field.name)
         own = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
         is_number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
         is_truth = pa.types.is_boolean(field.type)
         is_text = pa.types.is_temporal(field.type) or pa.types.is_string(field.type)
         if is_number or is_truth or is_text:
-            arrays[plain] = (column.cast(pa.int8()) if is_truth else column).to_numpy()
-            units[plain] = own or unit
+            arrays[field.name] = (column.cast(pa.int8()) if is_truth else column).to_numpy()
+            units[field.name] = own
     plain_metadata = {
         key.decode("utf-8", "replace"): value.decode("utf-8", "replace")
         for key, value in (table.schema.metadata or {}).items()

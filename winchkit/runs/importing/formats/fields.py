@@ -16,8 +16,9 @@ import numpy as np
 from winchkit.runs.importing.formats.dialect import decode
 from winchkit.runs.importing.formats.stamps import epoch_unit
 from winchkit.runs.importing.formats.variables import table_of_arrays
+from winchkit.runs.importing.names import name_and_unit
 from winchkit.runs.importing.table import ColumnTable
-from winchkit.runs.importing.units.spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import read_unit
 
 _LONGEST = 64
 """Most elements of an array in a message; longer ones are images and point clouds."""
@@ -147,7 +148,7 @@ def read_labelled(path: str, data: bytes) -> ColumnTable | None:
     for name, cells in columns.items():
         spelled = {unit for _, unit in cells} - {""}
         own = spelled.pop() if len(spelled) == 1 else ""
-        plain, unit = (name, own) if own else split_unit(name)
+        plain, unit = (name, own) if own else name_and_unit(name)
         arrays[plain], units[plain] = np.array([value for value, _ in cells]), unit
     inner = [n for n in filled if n not in rows and min(rows) < n < max(rows)]
     notes += [f"{len(inner)} lines of words between the rows are left out"] if inner else []

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from winchkit.runs.importing.formats.cells import number
-from winchkit.runs.importing.names import meaning_of
+from winchkit.runs.importing.formats.stamps import is_stamp
+from winchkit.runs.importing.names import meaning_of, name_and_unit
 from winchkit.runs.importing.units.spelling import is_unit_row, read_unit, split_unit
 
 Row = tuple[int, list[str]]
@@ -32,8 +33,8 @@ KEYS = frozenset(
 """Keys of a TwinCAT Scope export."""
 _X_VALUE = "X_Value"
 _RULE = re.compile(r":?[-=_+]{2,}:?")
-_NAME_ROW = {"channel name", "channelname", "signal name", "kanalname"}
-_UNIT_ROW = {"unit", "units", "unit symbol", "einheit"}
+_NAME_ROW = {"channelname", "signalname", "tracename", "kanalname"}
+_UNIT_ROW = {"unit", "units", "unitsymbol", "vunit", "einheit"}
 """First cells of the rows of a header that has the title of each row above the times."""
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
@@ -49,7 +50,7 @@ _RATEKEYS = re.compile(
 _STEPKEYS = re.compile(
     r"(delta_x|interval|sampl(?:e|ing) ?time ?interval|"
     r"sample ?time|sampling ?time|sample ?interval|sampling ?interval|sample ?period|"
-    r"sampling ?period|abtastzeit|abtastintervall|zykluszeit|cycle ?time|dt)"
+    r"sampling ?period|h ?resolution|abtastzeit|abtastintervall|zykluszeit|cycle ?time|dt)"
     r"\W*(?P<unit>[mun]?s)?\W*",
     re.IGNORECASE,
 )
@@ -74,10 +75,14 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     header = _of_labview(rows, width, decimal) or _of_oscilloscope(rows, width, decimal)
     if header is not None:
         return header
+    remarks = []
+    while rows and _is_remark(rows[-1][1]) and _has_names(rows[:-1], width, decimal):
+        *rows, (_, remark) = rows
+        remarks.append(remark)
     cut = _start_of_block(rows, width, decimal, is_blank=is_blank)
     if is_blank:
         cut = _start_of_names(rows, cut)
-    above = [cells for _, cells in rows[:cut]]
+    above = [*(cells for _, cells in rows[:cut]), *remarks]
     block = [
         _uncommented(cells, width) for _, cells in rows[cut:] if any(cells) and not _is_rule(cells)
     ]
@@ -85,7 +90,7 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
         block = [_with_brackets(cells, width) for cells in block]
     header = (
         _keyed(block, width)
-        or _titled(block, width)
+        or _titled([cells for _, cells in rows if any(cells)], width)
         or _paired(block, width)
         or _stacked(block, width)
     )
@@ -107,19 +112,15 @@ def _of_labview(rows: Sequence[Row], width: int, decimal: str) -> Header | None:
     if not marks or marks[-1] + 1 >= len(filled):
         return None
     segment = {cells[0]: cells for cells in filled[(marks[-2] if marks[1:] else 0) : marks[-1]]}
-    names = [split_unit(name) for name in _padded(filled[marks[-1] + 1], width)]
+    cells = _padded(filled[marks[-1] + 1], width)
+    names = list(map(name_and_unit, cells, _padded(segment.get("Y_Unit_Label", []), width)))
     is_clock = "Time" in segment.get("X_Dimension", [])
     times = [is_clock and name == _X_VALUE for name, _ in names]
-    given = _padded(segment.get("Y_Unit_Label", []), width)
-    units = [
-        own or (unit if read_unit(unit) else "")
-        for (_, own), unit in zip(names, given, strict=True)
-    ]
     steps = {cell for cell in segment.get("Delta_X", [])[1:] if cell}
     step = number(steps.pop(), decimal) if len(steps) == 1 else None
     return Header(
         ["time" if is_one else name for (name, _), is_one in zip(names, times, strict=True)],
-        ["s" if is_one else unit for unit, is_one in zip(units, times, strict=True)],
+        ["s" if is_one else unit for (_, unit), is_one in zip(names, times, strict=True)],
         [()] * width,
         _metadata(filled[: marks[0]]),
         step,
@@ -143,10 +144,9 @@ def _of_oscilloscope(rows: Sequence[Row], width: int, decimal: str) -> Header | 
         elif given := [found for cell in cells if (found := _INCREMENT.fullmatch(cell))]:
             step, units = number(given[0][1], decimal), [""] * width
         if step is not None and step > 0:
-            names = [split_unit(name) for name in _padded(cells, width)]
-            pairs = zip(names, units, strict=True)
-            known = [own or (unit if read_unit(unit) else "") for (_, own), unit in pairs]
-            return Header([name for name, _ in names], known, [()] * width, interval=step)
+            named = list(map(name_and_unit, _padded(cells, width), units))
+            names, known = [name for name, _ in named], [unit for _, unit in named]
+            return Header(names, known, [()] * width, interval=step)
     return None
 
 
@@ -181,6 +181,19 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
             break
         cut -= 1
     return cut
+
+
+def _is_remark(cells: Sequence[str]) -> bool:
+    """Whether a line has at most one cell."""
+    return sum(map(bool, cells)) <= 1
+
+
+def _has_names(rows: Sequence[Row], width: int, decimal: str) -> bool:
+    """Whether the last lines of more than one cell have a text in each column."""
+    lowest = next((cells for _, cells in reversed(rows) if not _is_remark(cells)), [])
+    return len(lowest) == width and all(
+        cell and number(cell, decimal) is None and not is_stamp(cell) for cell in lowest
+    )
 
 
 def _is_rule(cells: Sequence[str]) -> bool:
@@ -246,11 +259,10 @@ def _keyed(block: list[list[str]], width: int) -> Header | None:
     has_steps = any(key.lower().startswith("sampletime") for key in keyed)
     found = Header([], [], [])
     for index, name in enumerate(names):
-        plain, own = split_unit(name)
+        plain, unit = name_and_unit(name, units[index])
         is_time = name == _NAME
         following = names[index + 1] if is_time and index + 1 < width else ""
         found.names.append("time" if is_time else plain or str(index + 1))
-        unit = units[index] if read_unit(units[index]) else own
         found.units.append(("ms" if has_steps else "") if is_time else unit)
         found.labels.append((following,) if is_time else ())
     return found
@@ -258,19 +270,20 @@ def _keyed(block: list[list[str]], width: int) -> Header | None:
 
 def _titled(block: list[list[str]], width: int) -> Header | None:
     """Rows whose first cell is their title, above the times: LabVIEW SignalExpress, DIAdem."""
-    titles = [cells[0].strip().casefold() if cells else "" for cells in block]
+    titles = [re.sub(r"[ _]", "", cells[0]).casefold() if cells else "" for cells in block]
     row = next((n for n, title in enumerate(titles) if title in _NAME_ROW), None)
     if row is None:
         return None
-    title, names = block[row][0], _padded(block[row], width)
     below = next((n for n, own in enumerate(titles) if own in _UNIT_ROW), None)
-    units = [""] * width if below is None else _padded(block[below], width)
-    split = [("time", "") if name == title else split_unit(name) for name in names]
-    given = [unit if read_unit(unit) else "" for unit in units]
+    units = [] if below is None else block[below]
+    named = list(map(name_and_unit, _padded(block[row], width), _padded(units, width)))[1:]
+    known = [meaning_of(name) for name, _ in named]
+    has_times = any(meaning is not None and meaning.channel == "time" for meaning in known)
+    named.insert(0, ("" if has_times else "time", ""))
     others = [cells[:2] for n, cells in enumerate(block) if n not in {row, below}]
     return Header(
-        [name for name, _ in split],
-        [own or unit for (_, own), unit in zip(split, given, strict=True)],
+        [name for name, _ in named],
+        [unit for _, unit in named],
         [()] * width,
         {cells[0]: cells[1] for cells in others if len(cells) == 2},
     )
@@ -304,7 +317,8 @@ def _stacked(block: list[list[str]], width: int) -> Header:
     else:
         unit_row = None
     names, units, labels = [], [], []
-    split = [split_unit(cell) for cell in rows[-1]] if rows else [("", "")] * width
+    given = _padded(unit_row or [], width)
+    split = list(map(name_and_unit, rows[-1], given)) if rows else [("", "")] * width
     uppers = [_filled(row) for row in rows[:-1]]
     for index, (own_name, own_unit) in enumerate(split):
         name, unit = own_name, own_unit

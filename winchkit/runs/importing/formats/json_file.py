@@ -17,8 +17,8 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.formats.fields import fields_of
 from winchkit.runs.importing.formats.variables import table_of_arrays
+from winchkit.runs.importing.names import name_and_unit
 from winchkit.runs.importing.table import ColumnTable
-from winchkit.runs.importing.units.spelling import split_unit
 
 _DEEPEST = 6
 """Nesting of objects that is read; recordings have two or three levels."""
@@ -46,7 +46,9 @@ def read_json(path: str, data: bytes) -> ColumnTable | None:
             full = key if is_single or not name else f"{name}.{key}"
             # An index at the end is no unit.
             plain, unit = (
-                (full, "") if full.endswith("]") and full[-2:-1].isdecimal() else split_unit(full)
+                (full, "")
+                if full.endswith("]") and full[-2:-1].isdecimal()
+                else name_and_unit(full)
             )
             plain = full if plain in arrays else plain
             arrays[plain], units[plain] = array, unit

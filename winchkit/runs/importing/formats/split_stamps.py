@@ -1,4 +1,7 @@
-"""Stamps in two columns, whole seconds and a fraction: ROS headers, ``timeval``, EPICS archives."""
+"""Stamps in two columns, whole seconds and a fraction: ROS headers, ``timeval``, EPICS archives.
+
+The whole seconds may be a clock as text (``11:59:50``), as programmable controllers write them.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,11 @@ _SHORT = {"n": "nano", "u": "micro", "m": "milli"}
 _STEM = r"(?P<stem>|.*[^A-Za-z])"
 _SECONDS = re.compile(rf"{_STEM}(s|secs?|seconds?)([ _]?past[ _]?epoch)?", re.I)
 _FRACTION = re.compile(
-    rf"{_STEM}((?P<letter>[num])s(ecs?)?|(?P<word>nano|micro|milli)[ _]?(s|secs?|seconds?)?)", re.I
+    rf"{_STEM}((?P<letter>[num])s(ecs?)?"
+    r"|(?P<word>nano|micro|milli)[ _]?(s|secs?|seconds?|sekunden?)?)",
+    re.I,
 )
+_CLOCK = re.compile(r"(.*\D)?\d{1,2}:\d{2}:\d{2}")
 _BRACKETS = re.compile(r"[\[\](){}]")
 _CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z])")
 _SEPARATORS = " ._-/:"
@@ -29,7 +35,7 @@ def joined_stamps(table: ColumnTable) -> ColumnTable:
 
     As a number of 64 bits it resolves 0.24 µs in 2026.
     """
-    pairs = list(_pairs(table))
+    pairs = list(_pairs(table)) or list(_beside_a_clock(table))
     if not pairs:
         return table
     joined = {id(pair[0]): _joined(*pair) for pair in pairs}
@@ -61,6 +67,24 @@ def _pairs(table: ColumnTable) -> Iterator[tuple[FileColumn, FileColumn, str]]:
             yield whole, item, word
 
 
+def _beside_a_clock(table: ColumnTable) -> Iterator[tuple[FileColumn, FileColumn, str]]:
+    """The only column of times of day without a fraction, and the only one of fractions."""
+    clocks = [
+        item
+        for item in table.columns
+        if item.texts and all(_CLOCK.fullmatch(text.strip()) for text in item.texts)
+    ]
+    parts = []
+    for item in table.columns:
+        match = _FRACTION.fullmatch(_spelled(item))
+        if match is not None and len(item.known) == len(item):
+            word = (match["word"] or _SHORT[match["letter"].lower()]).lower()
+            if _is_whole(item, 1 / _FRACTIONS[word]):
+                parts.append((item, word))
+    if len(clocks) == len(parts) == 1 and len(clocks[0]) == len(parts[0][0]):
+        yield clocks[0], *parts[0]
+
+
 def _place(column: FileColumn, match: re.Match[str]) -> tuple[str, tuple[str, ...], int, str]:
     """What the two columns have in common."""
     stem = match["stem"].rstrip(_SEPARATORS).lower()
@@ -82,6 +106,10 @@ def _is_whole(column: FileColumn, limit: float) -> bool:
 
 
 def _joined(whole: FileColumn, part: FileColumn, word: str) -> FileColumn:
+    if whole.texts is not None:
+        digits = round(-math.log10(_FRACTIONS[word]))
+        pairs = zip(whole.texts, part.values, strict=True)
+        return replace(whole, texts=[f"{text.strip()}.{int(v):0{digits}d}" for text, v in pairs])
     match = _SECONDS.fullmatch(_spelled(whole))
     name = match["stem"].rstrip(_SEPARATORS) if match else ""
     values = whole.values + part.values * _FRACTIONS[word]

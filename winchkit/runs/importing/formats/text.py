@@ -267,6 +267,8 @@ def _first_of_numbers(rows: Sequence[Row], dialect: Dialect, *, is_keyed: bool) 
         if not _is_numeric(cells, dialect):
             continue
         after = [c for _, c in rows[index + 1 : index + 1 + 3 * _AHEAD] if any(c)][:_AHEAD]
+        if _has_title(cells, dialect) and after and not any(c[0] for c in after):
+            continue
         if sum(_is_numeric(c, dialect) for c in after) * 2 >= len(after):
             return index
     return None

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.names import name_and_unit
 from winchkit.runs.importing.table import ColumnTable, FileColumn, named_apart
-from winchkit.runs.importing.units.spelling import read_unit, split_unit
+from winchkit.runs.importing.units.spelling import read_unit
 
 _WIDEST = 200
 """Most columns of one matrix; a larger one is an image or a table of another kind."""
@@ -52,7 +53,10 @@ def table_of_arrays(
             columns.append(column_of(name, array, unit))
         elif array.ndim == 2 and min(array.shape) <= _WIDEST:
             long = array if array.shape[0] >= array.shape[1] else array.T
-            columns += [column_of(f"{name}[{k}]", long[:, k], unit) for k in range(long.shape[1])]
+            # The unit is that of the matrix: behind an index it is none.
+            plain, own = name_and_unit(name, unit)
+            plain, own = (plain, own) if read_unit(own) else (name, unit)
+            columns += [column_of(f"{plain}[{k}]", long[:, k], own) for k in range(long.shape[1])]
         elif array.size:
             left.append(f"variable '{name}' of shape {array.shape} is left out")
     lengths = sorted({len(item) for item in columns})
@@ -71,7 +75,7 @@ def column_of(name: str, array: Any, unit: str) -> FileColumn:
         missing = np.isnat(array)
         whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)
         return FileColumn(name, np.where(missing, np.nan, whole), "ns")
-    plain, own = (name, unit) if unit else split_unit(name)
+    plain, own = name_and_unit(name, unit)
     if own and read_unit(own) is not None:
         name, unit = plain, own
     return FileColumn(name, array.astype(np.float64), unit)
