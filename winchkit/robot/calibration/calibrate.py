@@ -34,6 +34,7 @@ from winchkit.robot.calibration.identifiability import (
 from winchkit.robot.calibration.notes import (
     home_notes,
     instrument_notes,
+    moved_points,
     warnings_of,
     worse_rotation,
 )
@@ -318,6 +319,7 @@ def calibrate(
             *left_out_poses(validation.place[missed], "the held-out error"),
             *instrument_notes(declared, chosen),
             *home_notes(given, equations, values),
+            *moved_points(given, equations, values),
             *warnings_of(equations, solution, weights, observed, after.unfound),
             *worse_rotation(errors_before, after),
             *unheld,

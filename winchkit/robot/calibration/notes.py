@@ -9,7 +9,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.robot.calibration.identifiability import Observability, outside_bounds
 from winchkit.robot.calibration.prediction import PoseErrors, rms
-from winchkit.robot.calibration.selection import FitEnd
+from winchkit.robot.calibration.selection import BEYOND_PRIOR, POINTS, FitEnd
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
 from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.parameters import EFFECTS
@@ -84,6 +84,20 @@ def home_notes(given: RobotEquations, fitted: RobotEquations, values: Array) -> 
         f"{float(np.max(np.abs(values[index]))) * 1e3:.3g} mm: fitted beside the geometry. Measure "
         "the home pose anew, or declare the effect home-length"
     ]
+
+
+def moved_points(given: RobotEquations, fitted: RobotEquations, values: Array) -> Iterator[str]:
+    """Points that left the priors of the file."""
+    for block in POINTS:
+        index, own = fitted.parameters.block[block], given.parameters.block[block]
+        std = given.parameters.std[own]
+        moved = np.where(std > 0, np.abs(values[index] - given.parameters.nominal[own]), 0.0)
+        if np.any(moved > BEYOND_PRIOR * std):
+            yield (
+                f"{block.replace('_', ' ')}s are up to {float(np.max(moved)) * 1e3:.3g} mm from "
+                f"the file's along an axis, whose prior has a standard deviation of "
+                f"{float(np.max(std)) * 1e3:.3g} mm: compare them with the robot"
+            )
 
 
 def worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:

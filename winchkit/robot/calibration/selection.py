@@ -18,7 +18,7 @@ there is one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, combinations
@@ -79,12 +79,16 @@ hardly turns the two are the same shift, which is then said to be the frame's.""
 DELTA_CHI_SQUARE = 9.0
 """Difference of criteria below which two explanations count as equal: the true one is worse by this
 much with probability at most 1/740."""
-_BEYOND_PRIOR = 3.0
-"""Standard deviations of its prior beyond which a winding radius imitates another gear ratio."""
+BEYOND_PRIOR = 3.0
+"""Standard deviations of its prior beyond which a parameter has left it, and a winding radius
+imitates another gear ratio."""
 _ODD = 5.0
 """Ratio of the closures' standard deviation to that of a usual encoder from which the lengths at
 home are tried (rule of thumb: robots have up to this by their cables and pulleys)."""
-_ROUNDS_AT_HOME = 5
+POINTS = ("exit_point", "anchor_point")
+"""Points of the robot."""
+_AT_HOME = ("home_length",)
+_ROUNDS_OF_PRIORS = 5
 """Each reduces the error of lengths at home that are 100 mm off by a factor of ten or more."""
 _LEVEL = 1e-6
 """Level of the score test for free numbers of the tracker (rule of thumb)."""
@@ -170,10 +174,12 @@ def fitted_with_instruments(
     """Fit the declared model, or the one with the instruments and ratios that the poses require;
     also gives the declared one at the values from which its fit starts."""
     declared, best = _fitted_with_tracker(equations, options, progress)
-    best = _recentred(best, options, progress)
+    # Points that may move would imitate another home where a tracker is blamed.
+    blamed = best.free - _instruments(equations).free
+    best = _recentred(best, options, progress, _AT_HOME if blamed else (*_AT_HOME, *POINTS))
     if (at_home := _with_home(equations, best, options, progress)) is not None:
         declared, best = at_home
-    best = _with_more(best, options, progress)
+    best = _with_more(_recentred(best, options, progress), options, progress)
     return declared, _with_ratios(best, options, progress)
 
 
@@ -204,7 +210,7 @@ def _with_home(
     trial = replace(equations, effects=(*equations.effects, HOME_LENGTH))
     trial = with_instruments(trial, _instruments(equations))
     declared, found = _fitted_with_tracker(trial, options, progress)
-    found = _recentred(found, options, progress)
+    found = _recentred(found, options, progress, _AT_HOME)
     count = int(np.count_nonzero(np.isfinite(found.equations.measured.motor_angle)))
     price = len(equations.robot.names) * log(count) + DELTA_CHI_SQUARE
     if not found.criterion + price < best.criterion:
@@ -239,7 +245,7 @@ def _fitted_with_tracker(
     first = None
     if "home_length" in equations.parameters.block:
         # They may be far off at the start, which no registration says.
-        started_there, error = _starting_at_home(declared, own)
+        started_there, error = _starting_at_home(declared)
         if not error > limit:
             first = fitted(started_there, options, progress)
     elif is_near(declared):
@@ -267,34 +273,45 @@ def _fitted_with_tracker(
     return declared, best if best is first else _mounted(best, predicted, options, progress)
 
 
-def _starting_at_home(
-    equations: RobotEquations, own: InstrumentValues
-) -> tuple[RobotEquations, float]:
-    """The equations with lengths at home by an adjustment, where they are beyond their prior, and
-    its misfit, m. With an unknown frame no lengths at home explain the positions: a fit would
-    creep."""
-    if "frame" in own.free:
-        return equations, 0.0
+def _starting_at_home(equations: RobotEquations) -> tuple[RobotEquations, float]:
+    """The equations with lengths at home and tracker by an adjustment, where the lengths are beyond
+    their prior, and its misfit, m."""
     index = equations.parameters.block["home_length"]
-    found, left = lengths_at_home(equations.robot, equations.measured, _LEAST_MISFIT)
-    beyond = np.abs(found) > _BEYOND_PRIOR * equations.parameters.std[index]
-    if not np.any(beyond):
+    found, instruments, left = lengths_at_home(equations, _LEAST_MISFIT)
+    if np.all(np.abs(found) <= BEYOND_PRIOR * equations.parameters.std[index]):
         return equations, left
-    starting = equations.parameters.starting("home_length", found)
-    return replace(equations, parameters=starting), left
+    there = with_instruments(equations, instruments) if equations.instruments else equations
+    return replace(there, parameters=there.parameters.starting("home_length", found)), left
 
 
-def _recentred(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
-    """The fit with the priors of the lengths at home about their estimates, where these left them:
-    a prior for a platform in its fixture says nothing of one that stood elsewhere."""
-    own = best.equations.parameters.block.get("home_length")
-    for _ in range(_ROUNDS_AT_HOME if own is not None else 0):
-        if np.all(np.abs(best.solution.linear.prior[own]) <= _BEYOND_PRIOR):
+def _recentred(
+    best: FitEnd,
+    options: Options,
+    progress: ProgressCallback,
+    blocks: Sequence[str] = (*_AT_HOME, *POINTS),
+) -> FitEnd:
+    """The fit with the priors of lengths at home and points about their estimates, where these left
+    them: a prior for a platform in its fixture says nothing of one that stood elsewhere."""
+    for _ in range(_ROUNDS_OF_PRIORS):
+        parameters, prior = best.equations.parameters, best.solution.linear.prior
+        own = {name: parameters.block[name] for name in blocks if name in parameters.block}
+        left = [name for name, i in own.items() if np.any(np.abs(prior[i]) > BEYOND_PRIOR)]
+        if not left:
             break
-        values = best.solution.state.values[own]
-        parameters = best.equations.parameters.starting("home_length", values)
+        for name in left:
+            parameters = parameters.starting(name, best.solution.state.values[own[name]])
         best = fitted(replace(best.equations, parameters=parameters), options, progress)
     return best
+
+
+def with_own_priors(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
+    """The fit with the priors of points about the robot's own, where they were moved."""
+    parameters, geometry = best.equations.parameters, best.equations.robot.geometry
+    for name in POINTS:
+        parameters = parameters.starting(name, getattr(geometry, name))
+    if np.array_equal(parameters.nominal, best.equations.parameters.nominal):
+        return best
+    return fitted(replace(best.equations, parameters=parameters), options, progress)
 
 
 def _with_more(best: FitEnd, options: Options, progress: ProgressCallback) -> FitEnd:
@@ -328,7 +345,7 @@ def _with_ratios(best: FitEnd, options: Options, progress: ProgressCallback) -> 
     layers distinguishes the two; on others the wider prior of the ratio takes the change."""
     radius = best.equations.parameters.block["winding_radius"]
     prior, held = best.solution.linear.prior[radius], best.solution.held[radius]
-    beyond = (np.abs(prior) > _BEYOND_PRIOR) | (held != 0)
+    beyond = (np.abs(prior) > BEYOND_PRIOR) | (held != 0)
     if not np.any(beyond):
         return best
     odd = ratios_of(best.equations, best.solution).named

@@ -17,8 +17,10 @@ import numpy as np
 from winchkit.robot.calibration.options import Options, ProgressCallback
 from winchkit.robot.calibration.selection import (
     DELTA_CHI_SQUARE,
+    POINTS,
     FitEnd,
     fitted,
+    with_own_priors,
 )
 from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import Mask, solve
@@ -36,7 +38,8 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
     lines = np.flatnonzero(best.equations.robot.geometry.swivel_radius > 0)
     if not len(lines) or "closure" not in best.equations.kinds:
         return ()
-    first, turned, every = best, np.zeros(len(names), dtype=bool), np.arange(len(names))
+    first = best = with_own_priors(best, options, progress)
+    turned, every = np.zeros(len(names), dtype=bool), np.arange(len(names))
     for _ in lines:
         trials = [turned ^ np.isin(every, own) for own in (lines, *lines[:, None])]
         trials = [trial for trial in trials if np.any(trial)]
@@ -46,9 +49,17 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
         if not found.with_prior < best.with_prior - DELTA_CHI_SQUARE:
             break
         best, turned = found, trial
-    if not best.with_prior < first.with_prior - _EVIDENCE:
+    if not best.with_prior < first.with_prior - _EVIDENCE * max(1.0, _of_points(best)):
         return ()
     return tuple(name for name, own in zip(names, turned, strict=True) if own)
+
+
+def _of_points(fit: FitEnd) -> float:
+    """Mean square of the points' distances from their priors, in standard deviations: where they
+    are wrong by more than the priors say, so are all differences between axes."""
+    block, std = fit.equations.parameters.block, fit.equations.parameters.std
+    index = np.concatenate([block[name].ravel() for name in POINTS])
+    return float(np.mean(fit.solution.linear.prior[index[std[index] > 0]] ** 2))
 
 
 def axes_text(lines: Sequence[str]) -> str:

@@ -32,9 +32,10 @@ from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
 
-_SEEN = 1e-6
-"""Singular values of a structure matrix below this share of the largest count as zero: rule of
-thumb, far above rounding and far below a robot that can be controlled."""
+_SEEN = 1e-3
+"""Singular values of a structure matrix below this share of the largest count as zero: about its
+relative error by a millimetre of geometry in a metre, so that what is left there is no force. A
+platform on four cables that hangs in the middle of its frame has one of zero."""
 
 _STEP = 1e-6
 """m and rad, of central differences: the truncation (1e-12) and the rounding (2e-16/1e-6) stay

@@ -15,9 +15,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.kinematics import Pose
-from winchkit.robot.geometry.pose_estimation import start_pose
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.geometry.tracker import Tracker, declared_tracker, pose_behind
 from winchkit.robot.identification.bundle_adjustment import (
     HUBER,
     BundleState,
@@ -26,7 +24,7 @@ from winchkit.robot.identification.bundle_adjustment import (
     solve,
 )
 from winchkit.robot.identification.equations import RobotEquations
-from winchkit.robot.identification.instruments import InstrumentValues
+from winchkit.robot.identification.instruments import InstrumentValues, declared_instruments
 from winchkit.robot.identification.parameters import HOME_LENGTH, parameters_of
 
 _STD = {
@@ -43,12 +41,15 @@ _LEAST_RADIUS = 1e-4
 
 
 def adjustment_of(
-    robot: Robot, measured: MeasuredPoses, tracker: Tracker, held: frozenset[str] = frozenset()
+    robot: Robot,
+    measured: MeasuredPoses,
+    instruments: InstrumentValues,
+    held: frozenset[str] = frozenset(),
 ) -> RobotEquations:
-    """Equations of lengths and positions; the tracker starts at its registration, ``held`` blocks
-    of parameters keep their values."""
+    """Equations of lengths and positions; trackers start at their registration, ``held`` blocks of
+    parameters keep their values."""
     robot = replace(robot, profile=replace(robot.profile, effect=()))
-    instruments = InstrumentValues(frozenset({"frame", "reflector"}), ("",), (tracker,))
+    instruments = replace(instruments, free=frozenset({"frame", "reflector"}))
     nothing: dict[str, Any] = {
         name: np.full_like(getattr(measured, name), np.nan)
         for name in ("angles", "swivel", "cable_length", "tension")
@@ -94,13 +95,17 @@ def misfit(adjustment: RobotEquations, solution: Solution, sigma: float) -> floa
     return sigma * float(np.sqrt(np.median(square) + of_priors))
 
 
-def lengths_at_home(robot: Robot, measured: MeasuredPoses, sigma: float) -> tuple[Array, float]:
-    """Cable at home beyond that of the geometry, (n,), of positions in a known frame, and the
-    misfit that is left with it; m."""
-    tracker = declared_tracker(robot.profile)
-    equations = adjustment_of(robot, measured, tracker, frozenset({"tracker_frame", "reflector"}))
-    angles = np.full_like(measured.position, np.nan)
-    shown = start_pose(measured.position, angles, robot.home, np.ones(6))
-    found = adjusted(equations, robot.guided(pose_behind(tracker, shown)), sigma)
-    lengths = np.asarray(found.state.values[equations.parameters.block["home_length"]])
-    return lengths, misfit(equations, found, sigma)
+def lengths_at_home(
+    equations: RobotEquations, sigma: float
+) -> tuple[Array, InstrumentValues, float]:
+    """Cable at home beyond that of the geometry, (n,), the instruments with their unknown numbers
+    beside it, and the misfit that is left; m."""
+    own = equations.instruments or declared_instruments(equations.robot, equations.measured)
+    held = {"frame": "tracker_frame", "reflector": "reflector"}
+    kept = frozenset(block for name, block in held.items() if name not in own.free)
+    adjustment = adjustment_of(equations.robot, equations.measured, own, kept)
+    found = adjusted(adjustment, equations.start(equations.parameters.nominal), sigma)
+    lengths = np.asarray(found.state.values[adjustment.parameters.block["home_length"]])
+    shown = adjustment.instruments_at(found.state.values)
+    assert shown is not None, "they have the tracker"
+    return lengths, replace(own, trackers=shown.trackers), misfit(adjustment, found, sigma)

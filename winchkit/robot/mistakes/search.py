@@ -26,6 +26,7 @@ from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, linearise
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, registered
+from winchkit.robot.identification.instruments import InstrumentValues
 from winchkit.robot.mistakes.adjustment import adjusted, adjustment_of, misfit
 from winchkit.robot.mistakes.table import (
     MIRRORED,
@@ -314,7 +315,8 @@ class _MistakeSearch:
         if not np.all(np.isfinite(closure)):
             return _Adjusted(mistakes, float("inf"), table, start, rotation_by(tracker.turn))
         tracker = registered(tracker, start, table.position, table.angles, {"frame"})
-        equations = adjustment_of(self.robot, table, tracker)
+        instruments = InstrumentValues(frozenset(), ("",), (tracker,))
+        equations = adjustment_of(self.robot, table, instruments)
         sigma = _SIGMA * self.motion
         solution = adjusted(equations, start, sigma)
         own = equations.instruments_at(solution.state.values)
