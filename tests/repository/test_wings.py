@@ -10,6 +10,7 @@ from math import sin
 from pathlib import Path
 from typing import ClassVar
 
+import click
 import pytest
 
 from command_line import invoke
@@ -80,10 +81,15 @@ def crane_of(reading: object, tree: dict[str, float]) -> _Crane:
     return _Crane(**tree)
 
 
+@click.command
+def command() -> None:
+    """Turn a crane."""
+
+
 WING = wings.Wing(
     kinds={"crane": "wing_of_cranes:crane_of"},
     calls={"_Crane": {"compare": "builtins:len"}},
-    commands={"Cranes": {"slew": ("winchkit.cli.files.completion", "Turn a crane.")}},
+    commands={"Cranes": {"slew": ("wing_of_cranes", "Turn a crane.")}},
 )
 """A wing of another distribution."""
 
