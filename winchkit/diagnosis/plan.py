@@ -9,8 +9,15 @@ from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
-from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
+from winchkit.diagnosis.design.programmes import (
+    ISOLATING,
+    OperatingRange,
+    range_of_limits,
+    range_of_runs,
+)
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.rendering import Shown
@@ -42,6 +49,8 @@ class WinchPlan(Plan):
     """Programmes with their time and power, the best first."""
     repeats: int
     """Runs of each: two where the runs so far have no repeat, which gives the noise."""
+    isolates: Attribution | None = None
+    """Unexplained residual whose cause the first programme isolates."""
 
     @property
     def inseparable(self) -> list[tuple[Term, Term]]:
@@ -56,7 +65,9 @@ class WinchPlan(Plan):
 
     def to_json(self) -> dict[str, Any]:
         """JSON of ``winchkit plan --json``, without the file written."""
-        return {"schema": 1, "offers": [offer.to_json(self.pairs) for offer in self.offers]}
+        offers = [offer.to_json(self.pairs) for offer in self.offers]
+        isolates = {} if self.isolates is None else {"isolates": self.isolates.to_json()}
+        return {"schema": 1, "offers": offers, **isolates}
 
 
 @overload
@@ -78,6 +89,7 @@ def plan(
 
     Programmes are simulated on the nominal model with the noise of the runs; those that separate
     effects that the runs cannot distinguish come first, then those that make effects detectable.
+    Where none is to be distinguished and a residual has no cause, the first one isolates its cause.
 
     Parameters
     ----------
@@ -117,4 +129,14 @@ def plan(
         repeats=repeats,
         operating_range=allowed,
     )
-    return WinchPlan(answer.pairs, dataset, allowed, tuple(found), repeats)
+    isolates = None if answer.pairs else _unexplained(answer.diagnosis)
+    if isolates is not None:
+        found.sort(key=lambda offer: offer.kind.name != ISOLATING[isolates.variable][0])
+    return WinchPlan(answer.pairs, dataset, allowed, tuple(found), repeats, isolates)
+
+
+def _unexplained(diagnosis: Diagnosis) -> Attribution | None:
+    """Largest unexplained pattern that a programme isolates."""
+    if diagnosis.verdict in {"adequate", "explained"}:
+        return None
+    return next((where for where in diagnosis.where if where.variable in ISOLATING), None)
