@@ -248,7 +248,7 @@ class DiagnoseView:
         path = self._free("next.toml")
         write_programme(found.programme(path.stem), path)
         best = found.offers[0]
-        texts = plan_texts(found)
+        texts = plan_texts(found, "It")
         if best.shows:
             texts.append(f"It could also show {listed([effect_name(e) for e in best.shows])}.")
         runs, profile = self._state.selection()

@@ -197,20 +197,20 @@ def _between(effects: Sequence[str]) -> str:
     return f" between {listed(list(effects))}" if effects else ""
 
 
-def plan_texts(found: WinchPlan) -> list[str]:
+def plan_texts(found: WinchPlan, first: str = "The first") -> list[str]:
     """What the first programme of a plan is for beside its powers, and what no programme shows."""
     texts, at = [], found.operating_range
     if found.isolates is not None:
         shows = ISOLATING[found.isolates.variable][1]
         texts.append(
-            f"The first is for what no effect explains: {where_text(found.isolates)}. It shows "
+            f"{first} is for what no effect explains: {where_text(found.isolates)}. It shows "
             f"{shows}."
         )
-    for first, second in found.inseparable:
+    for one, other in found.inseparable:
         texts.append(
-            f"{first.effect.id} / {second.effect.id}: no such motion within {at.low:.2f} m to "
+            f"{one.effect.id} / {other.effect.id}: no such motion within {at.low:.2f} m to "
             f"{at.high:.2f} m distinguishes them. What does: "
-            f"{told_apart(first.effect, second.effect)}"
+            f"{told_apart(one.effect, other.effect)}"
         )
     if not texts and not found.pairs and not any(offer.shows for offer in found.offers):
         texts.append(
