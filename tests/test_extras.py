@@ -139,6 +139,7 @@ def test_import(
     np.testing.assert_allclose(run.channels["motor_torque"].values, 1 + time, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # as a program shows none
 @needs("matplotlib")
 def test_plot(recorded: Path) -> None:
     import matplotlib

@@ -359,7 +359,7 @@ def test_verdicts_are_those_of_the_page_and_of_the_tables(recorded: Path, tmp_pa
     library = Library(tmp_path)
     judged = {tmp_path / "B/two.csv": Judgement("adequate", (), {}, "p + q")}
     rows = {row["name"]: row["verdict"] for row in library.rows(judged)["runs"]}
-    assert rows["A/one.csv"]["cause"] == "drum radius"
+    assert rows["A/one.csv"]["cause"] == "winding radius of the drum"
     assert rows["A/one.csv"]["ratios"] == {"tension": 2.0}
     assert (rows["B/two.csv"]["chip"], rows["B/two.csv"]["profile"]) == ("Adequate", "p + q")
     (tmp_path / "A/one.csv").write_text("time\nx\n")

@@ -19,6 +19,10 @@ def test_a_refusal_to_write_over_a_file_offers_no_option(tmp_path: Path) -> None
     said = page_text(str(refused.value))
     assert said == f"{taken} exists already; name another file"
     assert page_text("name it by --sample-rate") == "name it by sample rate"
+    unit = "'F' has no unit; one of N, kN; --column \"tension=\" where it is none of them"
+    assert page_text(unit) == "'F' has no unit; one of N, kN"
+    alone = "a run of a load cell alone, for `winchkit cell diagnose --run`; import the other file"
+    assert page_text(alone) == "a run of a load cell alone; import the other file"
 
 
 def test_a_new_file_takes_the_first_free_name(tmp_path: Path) -> None:

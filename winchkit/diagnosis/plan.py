@@ -10,8 +10,15 @@ from winchkit.arguments import require_type
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.discrimination import weights_of
 from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
-from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
+from winchkit.diagnosis.design.programmes import (
+    ISOLATING,
+    OperatingRange,
+    range_of_limits,
+    range_of_runs,
+)
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.rendering import Shown
@@ -43,6 +50,8 @@ class WinchPlan(Plan):
     """Programmes with their time and power, the best first."""
     repeats: int
     """Runs of each: two where the runs so far have no repeat, which gives the noise."""
+    isolates: Attribution | None = None
+    """Unexplained residual whose cause the first programme isolates."""
 
     @property
     def inseparable(self) -> list[tuple[Term, Term]]:
@@ -57,7 +66,9 @@ class WinchPlan(Plan):
 
     def to_json(self) -> dict[str, Any]:
         """JSON of ``winchkit plan --json``, without the file written."""
-        return {"schema": 1, "offers": [offer.to_json(self.pairs) for offer in self.offers]}
+        offers = [offer.to_json(self.pairs) for offer in self.offers]
+        isolates = {} if self.isolates is None else {"isolates": self.isolates.to_json()}
+        return {"schema": 1, "offers": offers, **isolates}
 
 
 @overload
@@ -79,7 +90,8 @@ def plan(
 
     Programmes are simulated on the nominal model with the noise of the runs. The first one belongs
     to the shortest set of runs that separates all effects that the runs cannot distinguish; then
-    come those that separate most of them, or make effects detectable.
+    come those that separate most of them, or make effects detectable. Where none
+    is to be distinguished and a residual has no cause, the first one isolates its cause.
 
     Parameters
     ----------
@@ -119,4 +131,14 @@ def plan(
         repeats=repeats,
         operating_range=allowed,
     )
-    return WinchPlan(answer.pairs, dataset, allowed, tuple(found), repeats)
+    isolates = None if answer.pairs else _unexplained(answer.diagnosis)
+    if isolates is not None:
+        found.sort(key=lambda offer: offer.kind.name != ISOLATING[isolates.variable][0])
+    return WinchPlan(answer.pairs, dataset, allowed, tuple(found), repeats, isolates)
+
+
+def _unexplained(diagnosis: Diagnosis) -> Attribution | None:
+    """Largest unexplained pattern that a programme isolates."""
+    if diagnosis.verdict in {"adequate", "explained"}:
+        return None
+    return next((where for where in diagnosis.where if where.variable in ISOLATING), None)

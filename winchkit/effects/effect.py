@@ -43,6 +43,8 @@ NEED_WORDS: Mapping[Need, str] = {
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""
 Output = Literal["cable_length", "tension", "motor_torque"]
 Placement = Literal["one", "all", "platform"]
+_SYMBOLS = {"axial_stiffness": "EA"}
+_SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,16 @@ class Parameter:
     """Variable over whose range in the data the grid's shares (0 to 1) are placed."""
     along: str = ""
     """Variable whose range in the data multiplies the grid, for a shape that is an extent."""
+
+
+def parameter_name(parameter: str) -> str:
+    """Name of a parameter in texts: its symbol, else its words."""
+    return _SYMBOLS.get(parameter, parameter.replace("_", " "))
+
+
+def parameter_unit(parameter: str, unit: str) -> str:
+    """Unit of a parameter in texts: per cent for shares, else its own."""
+    return "%" if unit == "1" and parameter in _SHARES else unit
 
 
 @dataclass(frozen=True)

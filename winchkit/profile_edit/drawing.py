@@ -60,7 +60,12 @@ FIELDS: tuple[Field, ...] = (
         "0.05 mm",
         drums=("squared",),
     ),
-    Field("cable.diameter", "diameter of the cable", "4 mm", "not needed beside layer_growth"),
+    Field(
+        "cable.diameter",
+        "diameter of the cable",
+        "4 mm",
+        "not needed where the layer growth is known",
+    ),
     Field(
         "drum.layer_growth",
         "radius that one turn on top of another adds",

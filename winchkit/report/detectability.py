@@ -10,9 +10,8 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.regression.cross_validation import excess
 from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.effect import Effect, Parameter, parameter_name, parameter_unit
 from winchkit.quantity_text import quantity
-from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
 _FEW = 4
 """Effects that a sentence lists; the table has all."""

@@ -8,7 +8,7 @@ from math import degrees, isfinite
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
-from winchkit.effects.effect import Effect
+from winchkit.effects.effect import Effect, parameter_name
 from winchkit.quantity_text import (
     PrintScale,
     grouped,
@@ -35,7 +35,6 @@ from winchkit.report.words.vocabulary import (
     interval_text,
     listed,
     output_name,
-    parameter_name,
     values_text,
 )
 

@@ -14,6 +14,7 @@ from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
 from winchkit.effects.card import sparkline
+from winchkit.effects.effect import parameter_name
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.quantity_text import grouped, percent, scale_for, significant, with_std
@@ -58,7 +59,6 @@ from winchkit.report.words.vocabulary import (
     error_scale,
     interval_text,
     output_name,
-    parameter_name,
     values_text,
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -103,10 +104,20 @@ def _header_faults(recording: RawColumns, names: list[str]) -> Iterator[Fault]:
     moves = not kinds.isdisjoint({"motor_angle", "position"})
     if not moves and (is_misspelt or kinds.isdisjoint({"tension", "load"})):
         yield _missing("motor_angle [rad]", names, recording)
+    if names and _is_foreign(recording):
+        file = shlex.quote(path)
+        yield Fault(f"'winchkit import {file} -o runs' reads files of other programs", path, line)
     rows, needed = recording.rows, 0 if recording.is_part else 1 if is_poses else 2
     if rows < needed:
         there = "has no rows after its header" if rows == 0 else "has one row only"
         yield Fault(f"the run {there}; it needs at least {needed}", path)
+
+
+def _is_foreign(recording: RawColumns) -> bool:
+    """Whether no column has a unit, or none a known name or a similar one."""
+    names = [name for name, _ in recording.header]
+    known = any(column_dimension(name) or near_miss(name) for name in names)
+    return not known or not any(unit for _, unit in recording.header)
 
 
 def _is_poses(names: list[str]) -> bool:

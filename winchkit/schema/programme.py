@@ -74,7 +74,7 @@ class ProgrammeStep(Table):
         if self.hold is not None:
             return f"hold {self.hold:g} s"
         where = f"to {self.to:g} m" if self.to is not None else f"by {self.by:g} m"
-        return f"winch {self.winch} {where}"
+        return f"{'all winches' if self.winch == ALL else f'winch {self.winch}'} {where}"
 
     def asks_beyond(self, hanging: float | None, warm: float | None) -> bool:
         """Whether it requests a load or a temperature other than the present ones."""

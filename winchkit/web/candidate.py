@@ -39,7 +39,9 @@ def candidate_card(state: PageState, effect_id: str) -> dict[str, Any]:
     if drawn is not None:
         output, own_change = in_units_of(profile, drawn)
         curves = state.curves[output]
-        found = curves.main_variable(own_change) or state.order_of(output)
+        found = curves.main_variable(own_change)
+        if found is None and (where := state.order_of(output)) is not None:
+            found = where.variable, where.order
         variable, periods = found or (next(iter(curves.shares)), None)
         out["signature"] = curves.signature(own_change, variable, periods)
         out["signature"]["variable"] = variable

@@ -31,7 +31,7 @@ from winchkit.plain_json import significant
 from winchkit.quantity_text import PrintScale, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, period_of
-from winchkit.report.words.sentence import CLEAR_ORDER, capital
+from winchkit.report.words.sentence import CLEAR_ORDER, capital, often_per_turn
 from winchkit.report.words.vocabulary import output_name, variable_name
 from winchkit.runs.run import Run
 
@@ -108,22 +108,27 @@ class OutputCurves:
         }
 
     def multiples(
-        self, order: tuple[str, int] | None = None, variables: Sequence[str] = ()
+        self, order: Attribution | None = None, variables: Sequence[str] = ()
     ) -> dict[str, Any]:
         """Residual over each of some variables, by default those that explain most of it.
 
-        ``order``: an angle, and the periods per turn of the residual over it.
+        ``order``: an angle with the periods per turn of the residual over it, and their share.
         """
         compared = np.flatnonzero(np.isfinite(self.residual))
         kept = _thinned(compared)
         residual = self.residual / self.scale.worth
         panels = []
-        wanted = [name for name in variables if name in self.shares] or list(self.shares)
-        for name in wanted[:_PANELS]:
-            periods = order[1] if order is not None and order[0] == name else None
-            over, (means,) = self._over(name, periods, [residual], compared, kept)
-            words = _capital_name(name)
-            panels.append(over | {"name": words, "share": self.shares[name], "means": means})
+        shares, names = dict(self.shares), {name: _capital_name(name) for name in self.shares}
+        periods: dict[str, int] = {}
+        known = None if order is None else shares.get(order.variable)
+        if order is not None and order.order is not None and known is not None:
+            shares[order.variable] = max(known, order.share)
+            periods[order.variable] = order.order
+            names[order.variable] = capital(often_per_turn(order.variable, order.order))
+        wanted = [name for name in variables if name in shares]
+        for name in (wanted or sorted(shares, key=lambda one: -shares[one]))[:_PANELS]:
+            over, (means,) = self._over(name, periods.get(name), [residual], compared, kept)
+            panels.append(over | {"name": names[name], "share": shares[name], "means": means})
         return {
             "output": self.output,
             "unit": self.scale.label,

@@ -10,7 +10,7 @@ from typing import Any
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, Estimate
-from winchkit.effects.effect import Effect
+from winchkit.effects.effect import Effect, parameter_name
 from winchkit.quantity_text import PrintScale, between, scale_for, significant, with_std
 from winchkit.report.detectability import useful_candidates
 from winchkit.report.words.sentence import (
@@ -31,21 +31,13 @@ from winchkit.report.words.steps import (
     step_text,
     step_title,
 )
-from winchkit.report.words.vocabulary import effect_name, output_name, parameter_name
+from winchkit.report.words.vocabulary import VERDICT_NAMES, effect_name, output_name
 from winchkit.web.words import page_text
 
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
 _CHANGE = 0.01
 """Change of an error that is shown as a number; below it the ladder has a dash."""
-VERDICT_WORDS = {
-    "adequate": "Adequate",
-    "explained": "Effect missing",
-    "partly": "Partly explained",
-    "unknown": "Unexplained",
-    "undecided": "Undecided",
-}
-"""Words of the five verdicts on a chip."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
     parts = error_text(diagnosis), remaining_text(diagnosis)
     return {
         "verdict": diagnosis.verdict,
-        "chip": VERDICT_WORDS[diagnosis.verdict],
+        "chip": VERDICT_NAMES[diagnosis.verdict],
         "headline": headline(diagnosis),
         "sentence": page_text(" ".join(part for part in parts if part)),
         "steps": [

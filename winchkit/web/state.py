@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,14 +10,18 @@ from typing import Any
 
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.steps import place_text
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
 from winchkit.profile_edit.naming import extended_name
-from winchkit.report.words.vocabulary import effect_name
+from winchkit.report.words.vocabulary import VERDICT_NAMES, effect_name, listed
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
-from winchkit.web.ladder import VERDICT_WORDS, ModelErrors, ladder, refitted, verdict
+from winchkit.web.ladder import ModelErrors, ladder, refitted, verdict
+
+_MOST_EFFECTS = 3
+"""Effects of a set that a cause names; of a larger one its place."""
 
 
 @dataclass(frozen=True)
@@ -27,18 +30,18 @@ class Judgement:
 
     verdict: str
     causes: Sequence[str]
-    """Effect of every certain step, place of every other one."""
+    """Every step in words."""
     outputs: Mapping[str, Mapping[str, Any]]
     """Errors of every output as ``winchkit diagnose --json`` gives them."""
     profile: str
 
     def to_json(self) -> dict[str, Any]:
         """Chip, cause, and error over noise floor of every output."""
-        named = " + ".join(re.sub("[-_]", " ", cause) for cause in self.causes)
+        named = " + ".join(self.causes)
         at_floor = "at the noise floor" if self.verdict == "adequate" else ""
         return {
             "verdict": self.verdict,
-            "chip": VERDICT_WORDS[self.verdict],
+            "chip": VERDICT_NAMES[self.verdict],
             "cause": named or at_floor,
             "profile": self.profile,
             "ratios": {
@@ -152,17 +155,22 @@ class PageState:
     def judgement(self) -> Judgement:
         """Verdict on the used runs; raises UsageError without a diagnosis."""
         found = self.diagnosed.diagnosis
-        causes = [s.effects[0] if s.certain else place_text(s) for s in found.steps]
+        causes = [
+            listed([effect_name(effect) for effect in step.effects], "or")
+            if len(step.effects) <= _MOST_EFFECTS
+            else place_text(step).replace("_", " ")
+            for step in found.steps
+        ]
         outputs = {name: vars(out) for name, out in found.outputs.items()}
         added = [version.added for version in self.versions[1:]]
         return Judgement(found.verdict, causes, outputs, " + ".join([self.source, *added]))
 
-    def order_of(self, output: str) -> tuple[str, int] | None:
-        """Angle and periods per turn of the main pattern of an output's residual, if any."""
+    def order_of(self, output: str) -> Attribution | None:
+        """Main pattern of an output's residual that is an order of an angle, if any."""
         found = () if self.answer is None else self.answer.diagnosis.where
         for where in found:
             if where.output == output and where.order is not None and where.variable in ANGLES:
-                return where.variable, where.order
+                return where
         return None
 
     def selection(self) -> tuple[str, str]:

@@ -6,15 +6,19 @@ import re
 from pathlib import Path
 
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
-_REPLACED = re.compile(r", or (?:replace|write over) it \(--replace[^)]*\)")
-"""A way that the page does not offer."""
+_ELSEWHERE = re.compile(
+    r", or (?:replace|write over) it \(--replace[^)]*\)"
+    r"|(?:;|, or name it by) --column \"[^\"]*\"(?: where it is none of them)?"
+    r"|, for `winchkit [^`]*`"
+)
+"""Ways that the page does not offer."""
 INTERNAL = "failed by a fault of winchkit; the terminal that serves this page has the details"
 """In place of what an exception of Python says."""
 
 
 def page_text(text: str) -> str:
     """A text whose options are words: ``name it by --sample-rate`` says ``by sample rate``."""
-    return _OPTION.sub(lambda found: found[1].replace("-", " "), _REPLACED.sub("", text))
+    return _OPTION.sub(lambda found: found[1].replace("-", " "), _ELSEWHERE.sub("", text))
 
 
 def free_path(folder: Path, name: str) -> Path:

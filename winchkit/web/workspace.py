@@ -31,7 +31,8 @@ from winchkit.effects.effect_template import write_wave_on_drum
 from winchkit.errors import FileError, UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
 from winchkit.regular_file import file_errors
-from winchkit.report.words.vocabulary import effect_name
+from winchkit.report.words.sentence import capital, plan_texts
+from winchkit.report.words.vocabulary import effect_name, listed
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -248,12 +249,14 @@ class DiagnoseView:
         path = self._free("next.toml")
         write_programme(found.programme(path.stem), path)
         best = found.offers[0]
-        shows = ", ".join(map(effect_name, best.shows)) or "no further effect"
+        texts = plan_texts(found, "It")
+        if best.shows:
+            texts.append(f"It could also show {listed([effect_name(e) for e in best.shows])}.")
         runs, profile = self._state.selection()
         return {
             "file": self.named(path),
             "text": path.read_text(encoding="utf-8"),
-            "words": f"{best.kind.name}, {_duration(best.minutes)}; it would show {shows}",
+            "words": " ".join([f"{capital(best.kind.name)}, {_duration(best.minutes)}.", *texts]),
             "command": f"winchkit plan {runs} -p {profile} -o {shlex.quote(self.named(path))}",
         }
 

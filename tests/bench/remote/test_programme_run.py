@@ -78,7 +78,7 @@ def test_its_steps_its_question_and_its_files_are_reported(rig: Rig, tmp_path: P
         ProgrammeStep(ask="look at it"),
         ProgrammeStep(hold=0.2),
     )
-    assert rig.until(lambda state: state["step"] == 1)["does"] == "winch all by -0.02 m"
+    assert rig.until(lambda state: state["step"] == 1)["does"] == "all winches by -0.02 m"
     with pytest.raises(UsageError, match="under way; end it first"):
         rig.start(tmp_path, ProgrammeStep(hold=0.1))
     rig.until(lambda state: state["asks"] == "look at it")

@@ -101,3 +101,12 @@ def test_a_curve_of_ones_choice_and_one_that_is_none(cornered: list[Path], tmp_p
     wrong = invoke("effects", "new", tmp_path / "x.py", *common, "motor-coulomb")
     assert wrong.exit_code == 2
     assert "no empirical effect" in wrong.stderr
+
+
+def test_a_plan_isolates_what_no_effect_explains(cornered: list[Path]) -> None:
+    found = answer("plan", *cornered, "-p", "bench-spiral")
+    assert found["isolates"]["order"] == 5
+    assert found["offers"][0]["kind"] == "speed ladder, both directions"
+    text = " ".join(invoke("plan", *cornered, "-p", "bench-spiral").stdout.split())
+    assert "The first is for what no effect explains: " in text
+    assert "It shows whether it grows with the speed" in text

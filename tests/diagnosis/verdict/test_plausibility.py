@@ -27,9 +27,11 @@ def test_a_range_is_relative_to_the_profile() -> None:
     assert reason("drum-radius", "radius_error", 0.0119) is None
     found = reason("drum-radius", "radius_error", -0.0184)
     assert found is not None
-    assert found.startswith("radius_error = −0.0184 m is beyond the plausible range")
-    assert "−0.012 m to 0.012 m" in found
-    assert found.endswith("check sign, unit, torque constant, gravity")
+    assert found.startswith("radius error = −18.4 mm is beyond the plausible range")
+    assert "−12 mm to 12 mm" in found
+    assert found.endswith(
+        "check the sign and unit of each channel, the torque constant, and gravity"
+    )
 
 
 def test_a_value_whose_interval_reaches_into_the_range_is_kept() -> None:
@@ -48,7 +50,7 @@ def test_without_a_range_a_bound_is_implausible_and_the_null_is_not() -> None:
 def test_a_value_at_a_bound_of_the_fit_is_implausible_however_wide_its_interval() -> None:
     """A cell that reads a tenth, ± 60 %: another quantity is in its column."""
     found = str(reason("cell-gain", "gain_error", -0.9, std=0.3))
-    assert found.startswith("gain_error = −0.9 is at a bound of the fit")
+    assert found.startswith("gain error = −90 % is at a bound of the fit")
     assert reason("cell-gain", "gain_error", -0.6, std=0.3) is None
 
 

@@ -112,4 +112,4 @@ def confirm(dialogue: Dialogue, key: str, question: str) -> str:
     answer = dialogue.ask(key, f"{question} [yes/no]", YES_OR_NO)
     if agreed(answer):
         return answer
-    raise NotPermitted(f"not confirmed: {key}; nothing was recorded")
+    raise NotPermitted(f"not confirmed: {question} Nothing was recorded ({key}).")

@@ -118,6 +118,7 @@ def _found(catalogue: Catalogue, words: Sequence[str]) -> list[Effect]:
 def _listing(effects: Sequence[Effect]) -> str:
     """Effects by the first output that they change; those that only a robot has by themselves."""
     from winchkit.report.words.columns import hanging
+    from winchkit.report.words.vocabulary import output_name
 
     lines: list[str] = []
     for place in (*_OUTPUTS, ""):
@@ -127,7 +128,11 @@ def _listing(effects: Sequence[Effect]) -> str:
             if ("" if effect.of_robots else effect.outputs[0]) == place
         ]
         if own:
-            lines += [f"On the way to {place}" if place else "On a robot", *hanging(own), ""]
+            lines += [
+                f"Effects on the {output_name(place)}" if place else "On a robot",
+                *hanging(own),
+                "",
+            ]
     return "\n".join([*lines, f"{len(effects)} effects; 'winchkit effects ID' shows one."])
 
 

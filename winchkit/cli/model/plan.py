@@ -28,7 +28,6 @@ from winchkit.errors import UsageError, suggest
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
     from winchkit.diagnosis.plan import WinchPlan
-    from winchkit.effects.term import Term
     from winchkit.schema.bench import LimitSpec
     from winchkit.schema.profiles.winch import WinchProfile
 
@@ -93,6 +92,8 @@ def _plan_winch(
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.report.words.columns import paragraph
+    from winchkit.report.words.sentence import plan_texts
     from winchkit.runs.files import refuse_existing
     from winchkit.schema.profiles.axis import AxisProfile
     from winchkit.schema.programme import write_programme
@@ -113,7 +114,10 @@ def _plan_winch(
         progress("simulating programmes", None)
         found = plan(answer, asked.catalogue, limits)
     chosen = found.offers[0].kind.name if path else None
-    lines = [_text(found.offers, found.pairs), *_silent(found, widened=limits is not None)]
+    texts = plan_texts(found)
+    if found.inseparable and limits is None:
+        texts.append("With --bench BENCH.toml the plan goes as far as that bench may.")
+    lines = [_text(found), *(line for text in texts for line in paragraph(text))]
     tell({**found.to_json(), "programme": path, "chosen": chosen}, lines)
     if path is None:
         words = () if bench is None else ("-b", bench)
@@ -156,32 +160,16 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
     return wired[name].limits
 
 
-def _silent(found: WinchPlan, *, widened: bool) -> list[str]:
-    """What none of these programmes distinguishes, and what does."""
-    from winchkit.effects.effect import told_apart
-
-    lines, operating_range = [], found.operating_range
-    for first, second in found.inseparable:
-        names = f"{first.effect.id} / {second.effect.id}"
-        lines.append(
-            f"{names}: no such motion within {operating_range.low:.2f} m to "
-            f"{operating_range.high:.2f} m distinguishes them. What does: "
-            f"{told_apart(first.effect, second.effect)}"
-        )
-    if lines and not widened:
-        lines.append("With --bench BENCH.toml the plan goes as far as that bench may.")
-    return lines
-
-
-def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
+def _text(plan: WinchPlan) -> str:
     """A line a kind, the best first; pairs of effects by letters."""
     from winchkit.quantity_text import percent
     from winchkit.report.words.columns import aligned, hanging, paragraph
 
+    found, pairs = plan.offers, plan.pairs
     if not pairs:
-        rows = [["programme", "minutes", "shows besides"]]
+        rows = [["programme", "minutes", "could also show"]]
         rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
-        said = "what to run next (nothing to distinguish: what else it would show)"
+        said = "what to run next (nothing to distinguish: effects that these runs cannot show)"
         return "\n".join([said, *hanging(rows)])
     letters = ascii_uppercase[: len(pairs)]
     table = [["programme", "minutes", *letters]]
@@ -193,7 +181,7 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
         f"  {letter}: {a.effect.id} / {b.effect.id}"
         for letter, (a, b) in zip(letters, pairs, strict=False)
     ]
-    besides = paragraph(f"the first shows besides: {_shown(found[0])}", "  ", "    ")
+    besides = paragraph(f"the first could also show: {_shown(found[0])}", "  ", "    ")
     return "\n".join([*head, *aligned(table), *besides])
 
 

@@ -58,6 +58,40 @@ _MOTIONS = (
     ),
 )
 """Four motions that excite friction, elasticity, creep and the drum; rule of thumb."""
+_LADDER, _REVERSALS, _WARMED = _MOTIONS[2].name, _MOTIONS[3].name, "full stroke, warmed up by 15 K"
+_AT_A_PLACE = (
+    _LADDER,
+    "whether it grows with the speed, as that of inertia and viscous friction, or stays, as that "
+    "of the geometry",
+)
+_AT_A_REVERSAL = (
+    _REVERSALS,
+    "whether it needs a distance after each reversal, as presliding and backlash do, or only the "
+    "direction, as Coulomb friction does",
+)
+_WITH_THE_LOAD = (
+    f"{_MOTIONS[1].name}, twice the load",
+    "whether it is in proportion to the load, and whether it depends on the length",
+)
+_OVER_TIME = _WARMED, "whether it follows the temperature"
+ISOLATING = {
+    "drum_angle": _AT_A_PLACE,
+    "motor_angle": _AT_A_PLACE,
+    "cable_length": _AT_A_PLACE,
+    "position": _AT_A_PLACE,
+    "speed": (_LADDER, "from which speed on it is there, and whether both directions are alike"),
+    "direction": _AT_A_REVERSAL,
+    "reversal_distance": _AT_A_REVERSAL,
+    "directed_length": _AT_A_REVERSAL,
+    "directed_load": _AT_A_REVERSAL,
+    "directed_tension": _AT_A_REVERSAL,
+    "load": _WITH_THE_LOAD,
+    "tension": _WITH_THE_LOAD,
+    "temperature": _OVER_TIME,
+    "time": _OVER_TIME,
+}
+"""Per variable of an unexplained residual the programme that isolates its cause, and what it shows:
+it varies what the causes of such a residual differ in."""
 _LOADS = {"": 1.0, ", half the load": 0.5, ", twice the load": 2.0}
 """In units of the mean load so far: a ratio of four at weights that a bench has; convention."""
 CANDIDATE_PROGRAMMES = (
@@ -66,7 +100,7 @@ CANDIDATE_PROGRAMMES = (
         for motion in _MOTIONS
         for words, load in _LOADS.items()
     ),
-    CandidateProgramme("full stroke, warmed up by 15 K", _THERE_AND_BACK, temperature_rise=15.0),
+    CandidateProgramme(_WARMED, _THERE_AND_BACK, temperature_rise=15.0),
 )
 """Each motion with each load, and one after warming up: every candidate is one run, so that what is
 hung or warmed is a choice as the motion is."""

@@ -11,14 +11,15 @@ from math import inf, isfinite
 from operator import attrgetter
 
 from winchkit.diagnosis.results import Estimate
-from winchkit.effects.effect import Parameter
+from winchkit.effects.effect import Parameter, parameter_name, parameter_unit
 from winchkit.effects.term import Term
+from winchkit.quantity_text import plain, scale_for
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 _ROUNDING = 1e-6
 """Distance from a bound, in typical sizes, that counts as at the bound; numerical."""
-_CHECK = "check sign, unit, torque constant, gravity"
+_CHECK = "check the sign and unit of each channel, the torque constant, and gravity"
 _OTHER_LAW = "the law is probably another one; look at the residual without it"
 
 
@@ -46,7 +47,7 @@ def implausible_value(
     """Reason why one value is implausible; None where it is plausible."""
     if parameter.whole or not isfinite(estimate.value):
         return None
-    shown = f"{parameter.name} = {_text(estimate.value, parameter)}"
+    shown = f"{parameter_name(parameter.name)} = {_text(estimate.value, parameter)}"
     known = plausible_range(parameter, profile)
     judged = parameter.role == "shape" or isfinite(estimate.std)
     if known is not None and judged and _is_held(estimate.value, known[:2], parameter):
@@ -88,5 +89,5 @@ def plausible_range(
 
 
 def _text(value: float, parameter: Parameter) -> str:
-    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    return f"{value:.4g}{unit}".replace("-", "−")
+    scale = scale_for(value, parameter_unit(parameter.name, parameter.unit))
+    return scale.labelled(plain(value / scale.worth))

@@ -16,6 +16,7 @@ from winchkit.errors import UsageError
 from winchkit.fleet.library.description import described
 from winchkit.fleet.library.files import RunFile, run_files
 from winchkit.fleet.library.partitions import Partitions, Row
+from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.web.channels import lines_of
@@ -103,7 +104,8 @@ def _judgements(tables: Partitions) -> dict[str, Judgement]:
     for row in tables.read("diagnoses", columns).to_pylist():
         if row["failure"] is None:
             outputs = json.loads(row["result"]).get("outputs", {})
-            causes = [*row["effects"], *(row["places"] or ())]
+            causes = [effect_name(effect) for effect in row["effects"]]
+            causes += [place.replace("_", " ") for place in row["places"] or ()]
             found = Judgement(row["verdict"], causes, outputs, row["profile_name"])
             out |= dict.fromkeys(row["runs"], found)
     return out

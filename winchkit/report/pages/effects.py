@@ -8,7 +8,7 @@ from math import inf, isfinite
 import numpy as np
 
 from winchkit.effects.card import Signature, in_control, parameter_kind, signature
-from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
+from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, parameter_name
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
 from winchkit.quantity_text import plain, scale_for
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
@@ -21,7 +21,6 @@ from winchkit.report.words.vocabulary import (
     listed,
     meaning,
     output_name,
-    parameter_name,
 )
 
 _INTERVALS = 120

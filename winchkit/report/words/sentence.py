@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from math import isnan, pi
 
 from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
+from winchkit.diagnosis.design.programmes import ISOLATING
+from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
+from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
@@ -192,6 +195,29 @@ def changes_text(diagnosis: Diagnosis) -> str:
 
 def _between(effects: Sequence[str]) -> str:
     return f" between {listed(list(effects))}" if effects else ""
+
+
+def plan_texts(found: WinchPlan, first: str = "The first") -> list[str]:
+    """What the first programme of a plan is for beside its powers, and what no programme shows."""
+    texts, at = [], found.operating_range
+    if found.isolates is not None:
+        shows = ISOLATING[found.isolates.variable][1]
+        texts.append(
+            f"{first} is for what no effect explains: {where_text(found.isolates)}. It shows "
+            f"{shows}."
+        )
+    for one, other in found.inseparable:
+        texts.append(
+            f"{one.effect.id} / {other.effect.id}: no such motion within {at.low:.2f} m to "
+            f"{at.high:.2f} m distinguishes them. What does: "
+            f"{told_apart(one.effect, other.effect)}"
+        )
+    if not texts and not found.pairs and not any(offer.shows for offer in found.offers):
+        texts.append(
+            f"No such motion within {at.low:.2f} m to {at.high:.2f} m shows an effect that these "
+            "runs could not show; a longer stroke or a heavier load may."
+        )
+    return texts
 
 
 def where_text(where: Attribution) -> str:

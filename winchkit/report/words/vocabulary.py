@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 
 from winchkit.diagnosis.results import Combination, Estimate, OutputFit, series_orders
+from winchkit.effects.effect import parameter_name, parameter_unit
 from winchkit.effects.series import fundamentals
 from winchkit.quantity_text import PrintScale, between, scale_for, with_std
 from winchkit.report.words.effect_names import EFFECTS
@@ -56,8 +57,6 @@ _ORDERS_SHOWN = 8
 """Amplitudes of a series in one line."""
 _MAIN_ORDERS = 0.1
 """Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
-_SYMBOLS = {"axial_stiffness": "EA"}
-_SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 
 
 def output_name(output: str) -> str:
@@ -103,16 +102,6 @@ def effect_name(effect: str) -> str:
     if curve is not None:
         words = f"curve of the {curve[1].replace('-', ' ')} over the {curve[2].replace('-', ' ')}"
     return f"{words} (line {line})" if line else words
-
-
-def parameter_name(parameter: str) -> str:
-    """Name of a parameter in texts: its symbol, else its words."""
-    return _SYMBOLS.get(parameter, parameter.replace("_", " "))
-
-
-def parameter_unit(parameter: str, unit: str) -> str:
-    """Unit of a parameter in texts: per cent for shares, else its own."""
-    return "%" if unit == "1" and parameter in _SHARES else unit
 
 
 def estimate_text(parameter: str, estimate: Estimate) -> str:

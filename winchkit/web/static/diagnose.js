@@ -276,7 +276,7 @@ const ownEffect = () => attempt(async () => {
 
 const planRun = () => attempt(async () => {
   const { file, text, words, command } = await ask("/api/plan", "{}");
-  dialog(`A programme for the next run: ${file}`, el("p", {}, `${words[0].toUpperCase()}${words.slice(1)}.`), el("pre", { tabindex: 0 }, text), el("p", { class: "note" }, "As a command:"), el("pre", { tabindex: 0 }, command));
+  dialog(`A programme for the next run: ${file}`, el("p", {}, words), el("pre", { tabindex: 0 }, text), el("p", { class: "note" }, "As a command:"), el("pre", { tabindex: 0 }, command));
 });
 
 // Two sets of points over one x, sorted.

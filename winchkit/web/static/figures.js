@@ -2,7 +2,7 @@
 // A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and runs.
 import { number, svg } from "./page.js";
 import { menu, saved } from "./exports.js";
-import { runText, seenRange, widest } from "./plots.js";
+import { runTexts, seenRange, widest } from "./plots.js";
 
 const GAP = 30, BOTTOM = 40, TOP = 26;
 
@@ -54,11 +54,9 @@ function drawnPanel(panel, w, h) {
   for (const value of steps(y0, y1)) parts.push(svg("line", { x1: LEFT, x2: w - GAP, y1: py(value), y2: py(value), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: py(value) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(value)));
   for (const value of steps(x0, x1)) parts.push(svg("text", { x: LEFT + ((value - x0) / (x1 - x0 || 1)) * (w - LEFT - GAP), y: h - BOTTOM + 16, "text-anchor": "middle", fill: "var(--muted)" }, number(panel.logarithmic ? 10 ** value : value, 3)));
   parts.push(svg("text", { x: (w + LEFT - GAP) / 2, y: h - BOTTOM + 32, "text-anchor": "middle", fill: "var(--muted)" }, wide(panel.xLabel) > w ? panel.xLabel.replace(/;.*(?= \[)/, "") : panel.xLabel));
-  for (const [i, run] of (panel.runs || []).entries()) {
-    const [from, to] = [run.at, panel.runs[i + 1] ? panel.runs[i + 1].at : x1].map((value) => Math.max(px(x0), Math.min(px(x1), px(value)))), words = runText(run, to - from, wide);
-    if (run.at >= x0 && run.at <= x1) parts.push(svg("line", { x1: from, x2: from, y1: TOP, y2: h - BOTTOM, stroke: "var(--edge)", "stroke-dasharray": "2 3" }));
-    if (words) parts.push(svg("text", { x: from + 3, y: TOP - 1, fill: "var(--muted)" }, words));
-  }
+  const runs = panel.runs || [], edges = runs.map((run, i) => [run.at, runs[i + 1] ? runs[i + 1].at : x1].map((value) => Math.max(px(x0), Math.min(px(x1), px(value)))));
+  for (const [i, { at }] of runs.entries()) if (at >= x0 && at <= x1) parts.push(svg("line", { x1: edges[i][0], x2: edges[i][0], y1: TOP, y2: h - BOTTOM, stroke: "var(--edge)", "stroke-dasharray": "2 3" }));
+  for (const [i, words] of runTexts(runs, edges, 0, wide)) parts.push(svg("text", { x: edges[i][0] + 3, y: TOP - 1, fill: "var(--muted)" }, words));
   for (const own of panel.series) parts.push(drawnSeries(own, own.x || panel.x, px, py, own.broken && !panel.logarithmic ? widest(own.x) : Infinity));
   return parts;
 }

@@ -21,7 +21,7 @@ export function counted({ rows, candidates }) {
 // without `choose` the candidates are names, without `focus` the heads.
 export function ladderGrid({ columns, rows }, { output, effect, only, most, present, focus, choose }) {
   const seen = only ? columns.filter((c) => c.output === output) : columns;
-  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, min(270px, 52%)) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
+  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, min(330px, 52%)) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
   grid.append(el("span", {}));
   for (const c of seen) grid.append(el("button", { class: `head ${c.output === output ? "focus" : ""}`, "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
   const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
@@ -38,7 +38,7 @@ export function ladderGrid({ columns, rows }, { output, effect, only, most, pres
     }
   }
   grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
-  for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === output ? "focus" : ""}` }, scale(most), el("span", { class: "value" })));
+  for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === output ? "focus" : ""}` }, scale(most, c.output === output), el("span", { class: "value" })));
   return grid;
 }
 
@@ -57,7 +57,7 @@ export function ladderExporter({ columns, rows }, { output, effect, present }, s
   let left = NAMES;
   for (const c of columns) {
     const wide = c.output === output ? 2 * share : share, right = left + wide - 8;
-    parts.push(words(c.name, left + 8, 16, { "font-weight": 600 }), words(c.unit, right, 16, end), inner(scale(most), left, axis, wide - 60, ROW));
+    parts.push(words(c.name, left + 8, 16, { "font-weight": 600 }), words(c.unit, right, 16, end), inner(scale(most, c.output === output), left, axis, wide - 60, ROW));
     rows.forEach((row, i) => {
       const cell = row.cells[c.output], before = rows[i - 1] && rows[i - 1].kind === "history" ? rows[i - 1].cells[c.output] : null;
       parts.push(inner(rung(row, cell, today.cells[c.output], most, c.output, row.kind === "candidate" && row.effect === effect, before), left, TOP + ROW * i, wide - 60, ROW), words(cell ? cell.text : "–", right, TOP + ROW * i + 18, end));
@@ -92,9 +92,10 @@ function rung(row, cell, now, most, output, picked, before) {
 const STAIR = { stroke: "var(--muted)", "stroke-dasharray": "2 2" };
 const stair = (from, to) => [svg("line", { x1: from, x2: from, y1: 0, y2: "50%", ...STAIR }), svg("line", { x1: from, x2: to, y1: "50%", y2: "50%", ...STAIR })];
 
-function scale(most) {
+// Every power of two at most four times, beside the column in focus the first and the last alone.
+function scale(most, wide) {
   const parts = [svg("line", { x1: "10%", x2: "96%", y1: 1, y2: 1, stroke: "var(--edge)" })];
-  const step = Math.max(1, Math.round(most / 3));
+  const step = Math.max(1, wide ? Math.round(most / 3) : Math.floor(most));
   for (let k = 0; k <= most; k += step) parts.push(svg("text", { x: `${place(2 ** k, most)}%`, y: 17, "text-anchor": "middle", fill: "var(--muted)", "font-size": 12 }, `${2 ** k}×`));
   return svg("svg", { "aria-hidden": "true" }, parts);
 }

@@ -156,8 +156,8 @@ export function review() { for (const [cause, { holds }] of [...messages]) if (!
 export function dialog(title, ...content) {
   const box = document.getElementById("dialog");
   const before = document.activeElement;
-  fill(box, el("div", { class: "row", style: { marginBottom: "12px" } }, el("h2", {}, title),
-    el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
+  fill(box, el("div", { class: "row title" }, el("h2", {}, title),
+    el("button", { class: "plain", onclick: () => box.close() }, "Close")), ...content);
   box.setAttribute("aria-label", title);
   // The event comes a frame after the closing: a dialog that was opened since keeps its focus.
   box.onclose = () => { if (!box.open && box.contains((messages.get("order") || {}).node || null)) alarm(""); place(); if (!box.open && before && before.focus) before.focus(); };

@@ -59,12 +59,12 @@ function marks(runs) {
     ctx.font = `${12 * devicePixelRatio}px Inter, system-ui, sans-serif`;
     ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
     const right = bbox.left + bbox.width, gap = 3 * devicePixelRatio;
-    runs.forEach((run, i) => {
-      const x = u.valToPos(run.at, "x", true), from = Math.max(x, bbox.left), to = i + 1 < runs.length ? Math.min(right, u.valToPos(runs[i + 1].at, "x", true)) : right;
+    const place = (at) => Math.max(bbox.left, Math.min(right, u.valToPos(at, "x", true))), ends = runs.map((run, i) => [place(run.at), i + 1 < runs.length ? place(runs[i + 1].at) : right]);
+    for (const { at } of runs) {
+      const x = u.valToPos(at, "x", true);
       if (x >= bbox.left - 1 && x <= right) { ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke(); }
-      const words = runText(run, to - from - 2 * gap, (text) => ctx.measureText(text).width);
-      if (words) ctx.fillText(words, from + gap, bbox.top - 5 * devicePixelRatio);
-    });
+    }
+    for (const [i, words] of runTexts(runs, ends, 2 * gap, (text) => ctx.measureText(text).width)) ctx.fillText(words, ends[i][0] + gap, bbox.top - 5 * devicePixelRatio);
     ctx.restore();
   };
 }
@@ -75,8 +75,20 @@ export function widest(x) {
   return 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
 }
 
-// The name of a labelled run where it has room, else its load.
-export const runText = (run, room, width) => run.labelled && [run.name, (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0]].find((text) => text && width(text) < room);
+// The name of each labelled run where it has room, else its load: once for neighbours of one load, at last its number alone.
+export function runTexts(runs, ends, gap, width) {
+  const load = (run) => (/[\d.]+ k?[gN]$/.exec(run.name) || [""])[0], out = [];
+  for (let i = 0; i < runs.length; i++) {
+    const own = load(runs[i]), fits = (text, last) => text && width(text) < ends[last][1] - ends[i][0] - gap;
+    let last = i;
+    if (!runs[i].labelled) continue;
+    if (!fits(runs[i].name, i) && !fits(own, i)) while (own && runs[last + 1] && load(runs[last + 1]) === own) last += 1;
+    const words = [runs[i].name, own, own.split(" ")[0]].find((text, k) => fits(text, k ? last : i));
+    if (words) out.push([i, words]);
+    i = last;
+  }
+  return out;
+}
 
 // Means over bins as lines, broken where no sample lies between two bins; `timed` ones, in the order
 // of time, are broken where a value is missing.

@@ -24,8 +24,8 @@ export const newProfile = () => attempt(async () => {
     }), el("button", { onclick: () => { pulleys.push(""); draw(); } }, "Add a pulley"));
   }
   draw();
-  dialog("New profile", el("p", { class: "note" }, "Each value with its unit. What you do not know, leave empty."), el("label", { class: "row" }, "Name", name),
-    el("img", { src: "/static/drums.svg", width: 620, height: 178, alt: "Sections through the axis of the kinds of drum: spiral, archimedean, grooved, squared" }), kind, table, list,
+  dialog("New profile", el("p", { class: "note" }, "Each value with its unit. What you do not know, leave empty."), el("label", { class: "row", style: { margin: "12px 0" } }, "Name", name),
+    el("img", { src: "/static/drums.svg", width: 620, height: 178, alt: "Sections through the axis of the kinds of drum: spiral, archimedean, grooved, squared" }), el("label", { class: "row" }, "Drum", kind), table, list,
     el("div", { class: "row", style: { marginTop: "12px" } }, el("button", { class: "primary", onclick: () => attempt(async () => {
       const seen = Object.fromEntries(fields.filter((field) => field.drums.includes(values["drum.kind"]) && (!field.after || values[field.after])).map(({ key }) => [key, values[key] || ""]));
       await order("new-profile", { name: name.value, values: seen, pulleys: pulleys.filter((text) => text.trim()) });
