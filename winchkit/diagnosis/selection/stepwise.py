@@ -310,10 +310,14 @@ def _without_minor_terms(
         return present, noise
     sampled = engine.discretization_power(present, noise)
     left, reduced = beyond(present, sampled), present
-    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
-        without = engine.refit(present.hypothesis.without(index), noise)
-        if beyond(without, sampled) - left < left:
-            reduced = engine.refit(reduced.hypothesis.without(index), noise)
+    while len(reduced.hypothesis.terms) > engine.n_initial_terms:
+        added = range(engine.n_initial_terms, len(reduced.hypothesis.terms))
+        others = [engine.refit(reduced.hypothesis.without(index), noise) for index in added]
+        # One after another: two that explain the same are needless each, not both.
+        without = min(others, key=lambda fitted: beyond(fitted, sampled))
+        if beyond(without, sampled) - beyond(reduced, sampled) >= left:
+            break
+        reduced = without
     return (
         (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
     )
