@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linprog
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
@@ -145,6 +144,8 @@ def _fewest_runs(strengths: Array, minutes: Array) -> Array:
     ``strengths`` are λ, (n_programmes, n_pairs). A linear programme: the shares of the λ that a
     pair needs, at most one each, add up to one of every pair that some run separates.
     """
+    from scipy.optimize import linprog  # Slow to import, and needed by a plan only.
+
     wanted = [p for p in strengths.T if power_to_separate(float(np.max(p))) >= LEAST_POWER]
     if not wanted:
         return np.zeros(len(strengths))

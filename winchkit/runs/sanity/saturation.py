@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from winchkit.arrays import Array
 from winchkit.quantity_text import quantity
@@ -150,7 +150,7 @@ def _chance_of_a_bend(signal: Array, at: NDArray[np.bool_], step: float) -> floa
     near = zip(*_stretches(signal >= signal.max() - 1.5 * step), strict=True)
     reached = [at[begin : begin + length] for begin, length in near]
     count, size = (sum(map(of, (part for part in reached if part.any()))) for of in (np.sum, len))
-    return float(binom.sf(count - 1, size, 2**-0.5))
+    return float(bdtrc(count - 1, size, 2**-0.5))
 
 
 def _ends_slopes(signal: Array, at: NDArray[np.bool_], step: float) -> bool:
