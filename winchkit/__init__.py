@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from winchkit.faces import homes, lazy
 from winchkit.rendering import renderers
 from winchkit.version import __version__ as __version__
+from winchkit.wings import homes, lazy
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench as Bench

@@ -4,6 +4,8 @@ A wing imports the core, and the core imports no wing: what it needs of one it l
 it needs it. A type whose objects a wing works on names it (``wing = "robot"``). Each wing has a
 module with its declaration; those of ``_OWN`` are this distribution's, that of any other name is
 the entry point of this name (group ``winchkit.wings``), which is looked for where no own name fits.
+
+The public names of a package, too, are imported when they are first used.
 """
 
 from __future__ import annotations
@@ -89,3 +91,22 @@ def _declared(name: str) -> Wing:
     from importlib.metadata import entry_points
 
     return next((point.load() for point in entry_points(group=_GROUP, name=name)), Wing())
+
+
+def homes(names: Mapping[str, str]) -> dict[str, str]:
+    """Module of each name, from the names (separated by spaces) of each module; sorted."""
+    return dict(sorted((name, module) for module, own in names.items() for name in own.split()))
+
+
+def lazy(
+    face: dict[str, Any], home: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """``__getattr__`` and ``__dir__`` of a package with these globals, whose names have homes."""
+
+    def get(name: str) -> Any:
+        if name not in home:
+            raise AttributeError(f"module '{face['__name__']}' has no attribute '{name}'")
+        value = face[name] = getattr(import_module(home[name]), name)
+        return value
+
+    return get, lambda: sorted({*face, *home})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from winchkit.faces import homes, lazy
+from winchkit.wings import homes, lazy
 
 if TYPE_CHECKING:
     from winchkit.fleet.diagnosis.diagnose import diagnose_each as diagnose_each

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from winchkit.faces import homes, lazy
+from winchkit.wings import homes, lazy
 
 if TYPE_CHECKING:
     from winchkit.bench.tracker import TrackerReceiver as TrackerReceiver

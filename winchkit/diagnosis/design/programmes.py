@@ -58,7 +58,8 @@ _MOTIONS = (
     ),
 )
 """Four motions that excite friction, elasticity, creep and the drum; rule of thumb."""
-_LADDER, _REVERSALS, _WARMED = _MOTIONS[2].name, _MOTIONS[3].name, "full stroke, warmed up by 15 K"
+_, _LENGTHS, _LADDER, _REVERSALS = (motion.name for motion in _MOTIONS)
+_WARMED = "full stroke, warmed up by 15 K"
 _AT_A_PLACE = (
     _LADDER,
     "whether it grows with the speed, as that of inertia and viscous friction, or stays, as that "
@@ -70,7 +71,7 @@ _AT_A_REVERSAL = (
     "direction, as Coulomb friction does",
 )
 _WITH_THE_LOAD = (
-    f"{_MOTIONS[1].name}, twice the load",
+    f"{_LENGTHS}, twice the load",
     "whether it is in proportion to the load, and whether it depends on the length",
 )
 _OVER_TIME = _WARMED, "whether it follows the temperature"
