@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import Ride, engine_for, term
-from winchkit.diagnosis.credibility import oversized, short_record
+from winchkit.diagnosis.credibility import asymmetric_friction, oversized, short_record
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
@@ -70,3 +70,28 @@ def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:
     assert smooth
     assert not any(step.certain for step in smooth)
     assert all("short-record" in [doubt.code for doubt in step.doubts] for step in smooth)
+
+
+@pytest.mark.parametrize(
+    ("gain", "friction", "doubted"),
+    [
+        ("load-gain", "pulley-capstan", True),
+        ("torque-constant", "gear-efficiency", True),
+        ("torque-constant", "pulley-capstan", False),
+        ("cell-gain", "pulley-capstan", False),
+    ],
+)
+def test_a_gain_beside_friction_of_the_load_may_be_its_asymmetry(
+    gain: str, friction: str, doubted: bool
+) -> None:
+    """Unless another output, which the friction changes too, tells them apart, or it is larger."""
+    other = {"friction": 0.05} if friction == "pulley-capstan" else {"efficiency": 0.9}
+    for size, small in ((0.02, True), (0.5, False)):
+        terms = [term(gain, gain_error=size), term(friction, **other)]
+        engine = engine_for(terms, Ride(samples=600))
+        present, noise = engine.fit_with_noise(engine.initial_model)
+        hypothesis = present.hypothesis
+        for own in terms:
+            hypothesis = hypothesis.with_term(own, engine.regression.n_runs)
+        reason = asymmetric_friction(engine.regression, engine.fixed(hypothesis, noise), 0)
+        assert (reason is not None) == (doubted and small)

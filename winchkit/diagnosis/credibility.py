@@ -13,6 +13,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.effects.effect import Effect
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.quantity_text import quantity
 
@@ -24,6 +25,10 @@ _ENDS = 0.01, 0.99
 _LEAST_TRAVEL = 0.5
 """Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
 (h²/6 for half a range h): any smooth law fits there."""
+
+
+_OF_LOAD = frozenset({"pulley friction", "gear friction", "load friction"})
+"""Families of friction in proportion to the load."""
 
 
 def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
@@ -67,6 +72,36 @@ def short_record(regression: Regression, fit: Fit, index: int) -> str | None:
         f"the axis turned by {np.degrees(travel):.2g}° only, over which any smooth law is a "
         "straight line"
     )
+
+
+def asymmetric_friction(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether a gain is smaller than a friction in proportion to the load in its outputs, in words.
+
+    A friction F (μ s + δ s²), s the direction, that differs between the directions by δ below μ is
+    one that does not, and the gain δ.
+    """
+    hypothesis, measured = fit.hypothesis, set(regression.outputs)
+    own = hypothesis.terms[index].effect
+    if "gain_error" not in own.null:
+        return None
+
+    def outputs_of(effect: Effect) -> set[str]:
+        return measured & set(effect.outputs)
+
+    def size_of(place: int) -> float:
+        change = regression.change(hypothesis) - regression.change(hypothesis.without(place))
+        rows = regression.rows_of(outputs_of(own))
+        return float(np.linalg.norm(np.concatenate([change[one] for one in rows])))
+
+    frictions = [
+        place
+        for place, term in enumerate(hypothesis.terms)
+        if term.effect.family in _OF_LOAD and outputs_of(term.effect) == outputs_of(own)
+    ]
+    if not frictions or size_of(index) > sum(map(size_of, frictions)):
+        return None
+    name = hypothesis.terms[frictions[0]].effect.id
+    return f"{name} that differs between the directions by as much would make the same"
 
 
 def _range(values: Array) -> float:

@@ -12,7 +12,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from winchkit.diagnosis.credibility import oversized, short_record
+from winchkit.diagnosis.credibility import asymmetric_friction, oversized, short_record
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import (
     COLLINEAR_DELAY,
@@ -179,7 +179,16 @@ def with_standing(
 
 
 _SERIOUS = frozenset(
-    {"implausible", "collinear", "undetermined", "small", "oversized", "short-record", "reversal"}
+    {
+        "implausible",
+        "collinear",
+        "undetermined",
+        "small",
+        "oversized",
+        "short-record",
+        "reversal",
+        "asymmetry",
+    }
 )
 """Doubts with which no step is certain."""
 
@@ -213,7 +222,11 @@ def _doubts(
         steps = result.final.iterations
         what = f"the fit did not converge in {steps} steps: its values may change"
         out.append(Doubt("not-converged", what))
-    for code, check in (("oversized", oversized), ("short-record", short_record)):
+    for code, check in (
+        ("oversized", oversized),
+        ("short-record", short_record),
+        ("asymmetry", asymmetric_friction),
+    ):
         if reason := check(regression, result.final, index):
             out.append(Doubt(code, reason))
     sizes = {n: e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"}
