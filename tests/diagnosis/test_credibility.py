@@ -84,7 +84,7 @@ def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:
 def test_a_gain_beside_friction_of_the_load_may_be_its_asymmetry(
     gain: str, friction: str, doubted: bool
 ) -> None:
-    """Unless another output, which the friction changes too, tells them apart, or it is larger."""
+    """Unless another output, which the friction changes too, separates them, or it is larger."""
     other = {"friction": 0.05} if friction == "pulley-capstan" else {"efficiency": 0.9}
     for size, small in ((0.02, True), (0.5, False)):
         terms = [term(gain, gain_error=size), term(friction, **other)]

@@ -210,7 +210,7 @@ def test_length_and_its_inverse_at_rest(effect: Effect) -> None:
 def test_one_sample_and_two_samples_are_runs_too() -> None:
     for effect in EFFECTS:
         time = np.array([0.0, 0.02])
-        signals = Signals(time, np.array([0.0, 0.1]), load=np.array([100.0, 101.0]))
+        signals = Signals(time, np.array([0.0, 0.1]), load=np.array([100.0, 101.0]), payload=5.0)
         motion = Line(STANDARD_PROFILE).motion(signals)
         predicted = predict(STANDARD_PROFILE, motion, effect, usual_values(effect))
         assert all(values.shape == (2,) for values in predicted.values())

@@ -71,7 +71,13 @@ def test_every_fault_is_reported_with_its_line() -> None:
     assert all(fault.startswith("winch.toml:7: ") for fault in faults)
     for fault, said in zip(
         faults,
-        ("did you mean 'drum-radius'", "gain_error", "unit 'mm'", "outside 0 to 0.5", "twice"),
+        (
+            "did you mean 'drum-radius'",
+            "gain_error",
+            "'mm' is a unit of length",
+            "outside 0 to 0.5",
+            "twice",
+        ),
         strict=True,
     ):
         assert said in fault

@@ -328,7 +328,7 @@ def test_on_a_terminal_it_asks_and_writes(tmp_path: Path) -> None:
     shown = _on_terminal(
         ["import", str(path), "-o", str(tmp_path / "runs")],
         [("how many in a motor turn?", f"{COUNTS}\n"), ("of which torque?", "2.4 kg\n"),
-         ("unknown torque unit", "2.4 N m\n")],
+         ("not of torque", "2.4 N m\n")],
     )  # fmt: skip
     assert "Aux input" in shown
     run = read_run(tmp_path / "runs" / "epos.csv")

@@ -84,7 +84,7 @@ def test_an_index_behind_an_unknown_name_is_no_evidence_of_a_length(tmp_path: Pa
     assert lengths["position"].factor == 1
 
 
-def test_titles_of_rows_may_stand_beside_an_empty_column(tmp_path: Path) -> None:
+def test_titles_of_rows_are_read_where_a_column_is_empty(tmp_path: Path) -> None:
     """ControlDesk: the path, the name and the unit of each channel, and a title of the numbers."""
     head = (
         '"descriptor","Capture"\n\npath,,"Model Root/q","Model Root/tau"\n'
