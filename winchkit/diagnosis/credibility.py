@@ -25,8 +25,6 @@ _ENDS = 0.01, 0.99
 _LEAST_TRAVEL = 0.5
 """Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
 (h²/6 for half a range h): any smooth law fits there."""
-
-
 _OF_LOAD = frozenset({"pulley friction", "gear friction", "load friction"})
 """Families of friction in proportion to the load."""
 
@@ -35,8 +33,7 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
     """Whether an effect changes an output by far more than that varies, in words."""
     if not isinstance(regression, TimeSeriesRegression):
         return None
-    hypothesis = fit.hypothesis
-    change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
+    change = _change_by(regression, fit, index)
     for output in regression.outputs:
         own = _range(regression.compared_samples(change, output))
         samples = regression.measured_samples(output)
@@ -80,28 +77,37 @@ def asymmetric_friction(regression: Regression, fit: Fit, index: int) -> str | N
     A friction F (μ s + δ s²), s the direction, that differs between the directions by δ below μ is
     one that does not, and the gain δ.
     """
-    hypothesis, measured = fit.hypothesis, set(regression.outputs)
-    own = hypothesis.terms[index].effect
+    terms = fit.hypothesis.terms
+    own = terms[index].effect
     if "gain_error" not in own.null:
         return None
 
     def outputs_of(effect: Effect) -> set[str]:
-        return measured & set(effect.outputs)
-
-    def size_of(place: int) -> float:
-        change = regression.change(hypothesis) - regression.change(hypothesis.without(place))
-        rows = regression.rows_of(outputs_of(own))
-        return float(np.linalg.norm(np.concatenate([change[one] for one in rows])))
+        return set(regression.outputs) & set(effect.outputs)
 
     frictions = [
         place
-        for place, term in enumerate(hypothesis.terms)
+        for place, term in enumerate(terms)
         if term.effect.family in _OF_LOAD and outputs_of(term.effect) == outputs_of(own)
     ]
-    if not frictions or size_of(index) > sum(map(size_of, frictions)):
+    if not frictions:
         return None
-    name = hypothesis.terms[frictions[0]].effect.id
+    rows = regression.rows_of(outputs_of(own))
+
+    def size_of(place: int) -> float:
+        change = _change_by(regression, fit, place)
+        return float(np.linalg.norm(np.concatenate([change[one] for one in rows])))
+
+    if size_of(index) > sum(map(size_of, frictions)):
+        return None
+    name = terms[frictions[0]].effect.id
     return f"{name} that differs between the directions by as much would make the same"
+
+
+def _change_by(regression: Regression, fit: Fit, index: int) -> Array:
+    """Change of the prediction by one effect of a fit, (n_rows,)."""
+    hypothesis = fit.hypothesis
+    return regression.change(hypothesis) - regression.change(hypothesis.without(index))
 
 
 def _range(values: Array) -> float:

@@ -16,19 +16,9 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES
 from winchkit.diagnosis.data.decimation import Decimation
 from winchkit.diagnosis.data.input_denoising import denoised_motions
-from winchkit.diagnosis.data.low_pass import (
-    RemovedBand,
-    cut_offs_of,
-)
-from winchkit.diagnosis.data.repeats import (
-    Repeats,
-    find_repeats,
-)
-from winchkit.diagnosis.data.sampling import (
-    away_from,
-    bridged,
-    bridged_channel,
-)
+from winchkit.diagnosis.data.low_pass import RemovedBand, cut_offs_of
+from winchkit.diagnosis.data.repeats import Repeats, find_repeats
+from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel
 from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.data.standstill import standstill_mask

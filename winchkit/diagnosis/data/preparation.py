@@ -22,22 +22,9 @@ from winchkit.diagnosis.data.dataset import (
 )
 from winchkit.diagnosis.data.decimation import decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts
-from winchkit.diagnosis.data.low_pass import (
-    RemovedBand,
-    UnfilteredOutput,
-    removed_by_low_pass,
-)
-from winchkit.diagnosis.data.repeats import (
-    Repeats,
-    excluded_alike,
-    outlying_repeat,
-    separated,
-)
-from winchkit.diagnosis.data.sampling import (
-    at_new_angles,
-    bridged,
-    evenly_stamped,
-)
+from winchkit.diagnosis.data.low_pass import RemovedBand, UnfilteredOutput, removed_by_low_pass
+from winchkit.diagnosis.data.repeats import Repeats, excluded_alike, outlying_repeat, separated
+from winchkit.diagnosis.data.sampling import at_new_angles, bridged, evenly_stamped
 from winchkit.diagnosis.data.sanity import findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import fast_count
 from winchkit.diagnosis.data.standstill import standstill_findings

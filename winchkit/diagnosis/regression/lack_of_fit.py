@@ -14,11 +14,7 @@ from scipy.special import fdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.noise import (
-    BandNoise,
-    replicate_contrasts,
-    sums_per_band,
-)
+from winchkit.diagnosis.regression.noise import BandNoise, replicate_contrasts, sums_per_band
 from winchkit.diagnosis.regression.projection import orthonormal
 
 BAND_LEVEL = 0.05

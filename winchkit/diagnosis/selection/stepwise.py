@@ -309,15 +309,17 @@ def _without_minor_terms(
     if not beyond(present, dict.fromkeys(noise.rms, 0.0)):
         return present, noise
     sampled = engine.discretization_power(present, noise)
-    left, reduced = beyond(present, sampled), present
+    reduced, now = present, beyond(present, sampled)
+    left = now
     while len(reduced.hypothesis.terms) > engine.n_initial_terms:
         added = range(engine.n_initial_terms, len(reduced.hypothesis.terms))
         others = [engine.refit(reduced.hypothesis.without(index), noise) for index in added]
         # One after another: two that explain the same are needless each, not both.
-        without = min(others, key=lambda fitted: beyond(fitted, sampled))
-        if beyond(without, sampled) - beyond(reduced, sampled) >= left:
+        errors = [beyond(fitted, sampled) for fitted in others]
+        if min(errors) - now >= left:
             break
-        reduced = without
+        now = min(errors)
+        reduced = others[errors.index(now)]
     return (
         (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
     )
