@@ -132,8 +132,8 @@ def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch")
         )
         raise UsageError(
             f"{names}: cannot be written as formulas of one sample (the function branches on the "
-            "motion, needs other samples, or has no Effect.carry); remove it from the profile, and "
-            f"add in the code:\n{template}"
+            "motion, needs other samples or the load of a run, or has no Effect.carry); remove it "
+            f"from the profile, and add in the code:\n{template}"
         )
     constants: dict[str, Constant] = {}
     recorder = _Recorder()
