@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import Ride, engine_for, term
-from winchkit.diagnosis.credibility import asymmetric_friction, oversized, short_record
+from winchkit.diagnosis.credibility import (
+    asymmetric_friction,
+    oversized,
+    short_record,
+    unresolved_order,
+)
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
@@ -62,6 +67,25 @@ def test_a_memory_longer_than_the_runs_is_not_certain(time_constant: float, shor
     reason = short_record(engine.regression, fitted, 0)
     assert (reason is not None) == short
     assert reason is None or "448 s, and the longest run lasts 59.9 s" in reason
+
+
+@pytest.mark.parametrize(("order", "unresolved"), [(4, False), (27, True)])
+def test_an_order_above_the_band_most_of_the_time_is_not_certain(
+    order: int, unresolved: bool
+) -> None:
+    """The motor turns at 4 rad/s on average, so that 27 periods a turn are about 18 Hz."""
+    rate = 20.0
+    time = np.arange(0.0, SECONDS, 1 / rate)
+    angle = 4.0 * time - np.sin(2 * np.pi * 0.1 * time)
+    torque = 0.1 * np.sin(order * angle) + 0.01 * np.random.default_rng(1).standard_normal(
+        len(time)
+    )
+    channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+    engine = selection_engine(prepare([Run("joint", time, channels, {})], JOINT), load_catalogue())
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    cogging = term("motor-cogging", amplitude=0.1, phase=0.0, order=float(order))
+    fitted = engine.fixed(engine.initial_model.with_term(cogging, 1), noise)
+    assert (unresolved_order(engine.regression, fitted, 0) is not None) == unresolved
 
 
 def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:

@@ -14,6 +14,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.effect import Effect
+from winchkit.effects.series import orders_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.quantity_text import quantity
 
@@ -25,6 +26,11 @@ _ENDS = 0.01, 0.99
 _LEAST_TRAVEL = 0.5
 """Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
 (h²/6 for half a range h): any smooth law fits there."""
+_STANDSTILL = 0.01
+"""Share of the highest speed below which the axis is not in motion."""
+_LEAST_RESOLVED = 0.5
+"""Share of the time in motion in which an order must lie within the band: below it the order rests
+on the slow parts, in which friction also has a pattern over the angle."""
 _OF_LOAD = frozenset({"pulley friction", "gear friction", "load friction"})
 """Families of friction in proportion to the load."""
 
@@ -68,6 +74,28 @@ def short_record(regression: Regression, fit: Fit, index: int) -> str | None:
     return (
         f"the axis turned by {np.degrees(travel):.2g}° only, over which any smooth law is a "
         "straight line"
+    )
+
+
+def unresolved_order(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether an order lies above the band for most of the motion, in words."""
+    term = fit.hypothesis.terms[index]
+    orders = orders_of(term)
+    if not orders or not isinstance(regression, TimeSeriesRegression):
+        return None
+    resolved = []
+    for segment in regression.segments:
+        if segment.output in term.effect.outputs:
+            turns = np.abs(regression.motions[segment.run].motor_rate) / (2 * np.pi)
+            band = segment.band
+            inside = max(orders) * turns < (band.cut_off or band.rate / 2)
+            resolved.append(inside[turns > _STANDSTILL * np.max(turns)])
+    share = float(np.mean(np.concatenate(resolved)))
+    if share >= _LEAST_RESOLVED:
+        return None
+    return (
+        f"the band of the comparison contains its order in {100 * share:.0f} % of the time in "
+        "motion only: run more slowly, or sample faster"
     )
 
 

@@ -12,7 +12,12 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
-from winchkit.diagnosis.credibility import asymmetric_friction, oversized, short_record
+from winchkit.diagnosis.credibility import (
+    asymmetric_friction,
+    oversized,
+    short_record,
+    unresolved_order,
+)
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import (
     COLLINEAR_DELAY,
@@ -188,6 +193,7 @@ _SERIOUS = frozenset(
         "short-record",
         "reversal",
         "asymmetry",
+        "unresolved",
     }
 )
 """Doubts with which no step is certain."""
@@ -226,6 +232,7 @@ def _doubts(
         ("oversized", oversized),
         ("short-record", short_record),
         ("asymmetry", asymmetric_friction),
+        ("unresolved", unresolved_order),
     ):
         if reason := check(regression, result.final, index):
             out.append(Doubt(code, reason))
