@@ -85,7 +85,6 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "predictable residual": {"diagnose.predictable_share": lambda *_: 0.0},
     "pairs": {"selection.stepwise._best_pair": _nothing},
     "exchange for a pair": {"selection.stepwise.pair_exchange": _second},
-    "minor terms": {"selection.stepwise._without_minor_terms": lambda _, p, noise: (p, noise)},
     "rest imitated": {"selection.stepwise._imitates_rest": _no},
     "truncated series": {"selection.engine.truncated_series": lambda effect: (effect,)},
     "shape at its bound": {"selection.engine.shape_at_bound": _no},

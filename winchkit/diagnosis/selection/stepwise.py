@@ -13,7 +13,7 @@ Miller, A. (2002). Subset Selection in Regression, 2nd ed. Chapman & Hall.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import dropwhile
 
@@ -84,8 +84,7 @@ def stepwise_selection(
     start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
     known(start)
     initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
-    larger, noise, tried = _forward_selection(engine, *initial, scores, threshold)
-    final, noise = _without_minor_terms(engine, larger, noise)
+    final, noise, tried = _forward_selection(engine, *initial, scores, threshold)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or lacking
@@ -287,42 +286,6 @@ def _exchange_and_eliminate(
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
     return engine.fit_with_noise(present.hypothesis, noise)
-
-
-def _without_minor_terms(
-    engine: SelectionEngine, present: Fit, noise: BandNoise
-) -> tuple[Fit, BandNoise]:
-    """Model without additions that explain less than what all of them leave, with repeats.
-
-    Such additions imitate a part of what is missing. Both are held-out excesses over the noise and
-    over what coarse samples add.
-    """
-    if not noise.from_repeats or len(present.hypothesis.terms) == engine.n_initial_terms:
-        return present, noise
-    folds = engine.folds(present, noise)
-
-    def beyond(fitted: Fit, sampled: Mapping[str, float]) -> float:
-        errors = held_out_rms(engine.regression, fitted, noise, folds)
-        own = {name: max(0.0, rms**2 - sampled[name]) ** 0.5 for name, rms in errors.items()}
-        return excess(own, noise.rms)
-
-    if not beyond(present, dict.fromkeys(noise.rms, 0.0)):
-        return present, noise
-    sampled = engine.discretization_power(present, noise)
-    reduced, now = present, beyond(present, sampled)
-    left = now
-    while len(reduced.hypothesis.terms) > engine.n_initial_terms:
-        added = range(engine.n_initial_terms, len(reduced.hypothesis.terms))
-        others = [engine.refit(reduced.hypothesis.without(index), noise) for index in added]
-        # One after another: two that explain the same are needless each, not both.
-        errors = [beyond(fitted, sampled) for fitted in others]
-        if min(errors) - now >= left:
-            break
-        now = min(errors)
-        reduced = others[errors.index(now)]
-    return (
-        (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
-    )
 
 
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit:
