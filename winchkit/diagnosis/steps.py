@@ -37,9 +37,6 @@ from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.open_law import OpenLaw
 from winchkit.diagnosis.verdict.plausibility import implausible
 
-_MOST_ALTERNATIVES = 4
-"""Members of a set, the simplest first; more are named in a doubt. Radius, ratio and gain of the
-length instrument are three names of one change, beside which there may be another law."""
 _WELL_KNOWN = 0.01
 """Share of what a step explains that may be no noise where it is certain: the second order of a
 right law; measured: of 150 cases right laws leave at most 0.002 of it, wrong ones 0.05 and more."""
@@ -65,9 +62,9 @@ def steps_of(
     spread = spread or spread_of(regression, final, noise, regression.blocks)
     own = estimates(regression, final, spread)[engine.n_initial_terms :]
     covariance = value_covariance(regression, final, noise)
-    for every, gain, (term, values) in zip(sets, _gains(engine, final, noise), own, strict=True):
-        further = every.effects[_MOST_ALTERNATIVES:]
-        equivalence = every.only(every.effects[:_MOST_ALTERNATIVES])
+    for equivalence, gain, (term, values) in zip(
+        sets, _gains(engine, final, noise), own, strict=True
+    ):
         parameters = {
             member.effect.id: values
             if member.effect.id == term.effect.id
@@ -86,7 +83,7 @@ def steps_of(
                 equivalence.angles,
                 combination=combination,
                 place=place,
-                doubts=(Doubt("further", _further_text(further)),) if further else (),
+                doubts=_further(equivalence.further),
             )
         )
     return tuple(out)
@@ -249,8 +246,9 @@ def _is_determined(null: Mapping[str, float], name: str, estimate: Estimate) -> 
     return bool(estimate.std < abs(estimate.value - null[name]))
 
 
-def _further_text(effects: Sequence[str]) -> str:
-    return f"nor can they distinguish it from {', '.join(effects)}"
+def _further(effects: Sequence[str]) -> tuple[Doubt, ...]:
+    text = f"nor can they distinguish it from {', '.join(effects)}"
+    return (Doubt("further", text),) if effects else ()
 
 
 def _values_of_rival(

@@ -13,7 +13,7 @@ Wilks, S. S. (1938). Ann. Math. Statist. 9, 60-62.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,6 +41,9 @@ _MOST_RIVALS = 6
 """Rivals that are refitted."""
 _SCORE_MARGIN = 40.0
 """Explained χ² below that of the named effect, within which a rival is refitted."""
+_MOST_MEMBERS = 4
+"""Members of a set; further ones are named in a doubt. Radius, ratio and gain of the length
+instrument are three names of one change, beside which there may be another law."""
 _LEAST_SHARE = 0.5
 """Share of the named effect's decrease of χ² that a rival must reach."""
 _TORQUE = {"motor_torque"}
@@ -71,6 +74,8 @@ class EquivalenceSet:
     """Fit of each member beside all other effects."""
     angles: dict[str, float]
     """Angle between its signature and each rival's, rad."""
+    further: tuple[str, ...]
+    """Effects beyond four, which fit worst."""
 
     def beginning_with(self, effect: str) -> EquivalenceSet:
         """The same set with another member first, beside which the others are compared."""
@@ -79,16 +84,6 @@ class EquivalenceSet:
         fits = tuple(self.fits[i] for i in order)
         names = tuple(self.effects[i] for i in order)
         return replace(self, term=terms[0], effects=names, terms=terms, fits=fits)
-
-    def only(self, effects: Collection[str]) -> EquivalenceSet:
-        """The same set without other members than ``effects``."""
-        kept = [i for i, effect in enumerate(self.effects) if effect in effects]
-        terms, fits = [self.terms[i] for i in kept], [self.fits[i] for i in kept]
-        own = self.term if self.term in terms else terms[0]
-        names = tuple(term.effect.id for term in terms)
-        # Angles from the signature of an effect that has left the set are not those of another.
-        angles = {n: self.angles[n] for n in names if n in self.angles and self.term in terms}
-        return EquivalenceSet(own, names, tuple(terms), tuple(fits), angles)
 
 
 def equivalence_set(
@@ -154,6 +149,7 @@ def equivalence_set(
             for m in beside
             if m is not None and not _predicts_worse(engine, m.compared, losses, dispersed)
         ]
+    members, further = _at_most_four(members, own)
     projected = engine.projected(base, dispersed)
     angles = {
         member.term.effect.id: _angle(projected, own.effect.id, member.term.effect.id)
@@ -162,7 +158,8 @@ def equivalence_set(
     }
     terms = tuple(member.term for member in members)
     fits = tuple(member.fit for member in members)
-    return EquivalenceSet(own, tuple(t.effect.id for t in terms), terms, fits, angles)
+    names = tuple(term.effect.id for term in terms)
+    return EquivalenceSet(own, names, terms, fits, angles, further)
 
 
 @dataclass(frozen=True)
@@ -257,6 +254,18 @@ def _ordered(
         return count, worse, len(effect.needs), engine.place_in_catalogue(effect.id)
 
     return sorted(members, key=key)
+
+
+def _at_most_four(members: Sequence[_Member], own: Term) -> tuple[list[_Member], tuple[str, ...]]:
+    """The first member, the named effect and those that fit best, in their order; ids of the
+    others.
+    """
+    order = range(len(members))
+    kept = sorted(
+        order, key=lambda i: (i > 0, members[i].term is not own, members[i].compared.chi_square)
+    )[:_MOST_MEMBERS]
+    further = tuple(members[i].term.effect.id for i in order if i not in kept)
+    return [members[i] for i in sorted(kept)], further
 
 
 def _angle(projected: Projected, first: str, second: str) -> float:
