@@ -105,7 +105,9 @@ def test_unknown_has_the_patterns_and_no_name() -> None:
 def test_unknown_with_steps_does_not_hide_them_behind_no_effect() -> None:
     text = headline(diagnosis_of("unknown", ELASTIC, unexplained_share=0.7))
     assert text == "Known effects explain little of the cable length error"
-    assert "70 % of the error" in sentence(diagnosis_of("unknown", ELASTIC, unexplained_share=0.7))
+    whole = sentence(diagnosis_of("unknown", ELASTIC, unexplained_share=0.7))
+    assert "With the effect found, the cable length error falls" in whole
+    assert "70 % of the error" in whole
 
 
 def test_partly_has_both_the_effect_and_what_remains() -> None:

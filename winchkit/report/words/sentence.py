@@ -100,6 +100,8 @@ def error_text(diagnosis: Diagnosis) -> str:
     first, *others = steps
     either = len(first.effects) > 1 and not first.whole
     opening = "With them" if others else "With either" if either else "With it"
+    if diagnosis.verdict == "unknown":
+        opening = f"With the effect{'s' if others else ''} found"
     if not others and all(is_wrong_value(effect) for effect in first.effects):
         opening = "With either corrected" if either else "Corrected"
     if all(step.refitted for step in steps):
