@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnosis_runs import CATALOGUE, GROOVED, Ride, engine_for, made, term
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
-from winchkit.diagnosis.selection.stepwise import _without_minor_terms
 from winchkit.effects.catalogue import Catalogue
 
 RIDE = Ride(samples=400)
@@ -51,15 +50,3 @@ def test_a_candidate_with_feasible_sign_scores() -> None:
     best = engine.scores(present, noise)[0]
     assert best.candidate.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)
-
-
-def test_of_two_terms_that_explain_the_same_one_stays() -> None:
-    """Beside a friction that is not in the model, each alone explains less than what is left."""
-    cogging = term("motor-cogging", amplitude=0.2, phase=0.3, order=6.0)
-    ripple = term("torque-ripple", amplitude=1e-3, phase=0.3, order=6.0)
-    engine = engine_for((cogging, term("motor-coulomb", torque=0.1)), Ride(stroke=60.0), (10.0,))
-    both = engine.initial_model
-    for own in (cogging, ripple):
-        both = both.with_term(own, engine.regression.n_runs)
-    present, noise = engine.fit_with_noise(both)
-    assert len(_without_minor_terms(engine, present, noise)[0].labels) == 1

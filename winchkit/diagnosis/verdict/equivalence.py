@@ -120,8 +120,11 @@ def equivalence_set(
         fitted = trial.fit
         if not np.isfinite(trial.criterion) or fitted.chi_square > least:
             continue
-        worse = fits_worse(engine.regression, fitted, own_fit, dispersed) and _predicts_worse(
-            engine, fitted, losses, dispersed
+        residual = _where_explained(engine, fitted, own_fit, noise, own.effect.outputs)
+        weighted = residual * dispersed.inverse_sigma(engine.regression)
+        judged = replace(fitted, residual=residual, chi_square=float(weighted @ weighted))
+        worse = fits_worse(engine.regression, judged, own_fit, dispersed) and _predicts_worse(
+            engine, judged, losses, dispersed
         )
         member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
         if _is_listed(own.effect, member.term.effect):
@@ -170,6 +173,24 @@ class _Member:
     """Fit that is reported: of the named effect the final one."""
     compared: Fit
     """Fit under the variances of the comparison."""
+
+
+def _where_explained(
+    engine: SelectionEngine, rival: Fit, own: Fit, noise: BandNoise, acts_on: Sequence[str]
+) -> Array:
+    """Residual of a rival, which is that of the named model in outputs in which only the rival acts
+    and adds less to the squared error than that model leaves above the noise: an error of unknown
+    cause is no evidence against it.
+    """
+    regression, residual = engine.regression, rival.residual.copy()
+    known = noise.power[regression.band_of_row] * regression.share_of_row
+    only = {*rival.hypothesis.terms[-1].effect.outputs} - {*acts_on}
+    for output in only & {segment.output for segment in regression.segments}:
+        rows = np.r_[tuple(regression.rows_of([output]))]
+        left = float(np.sum(own.residual[rows] ** 2 - known[rows]))
+        if float(np.sum(rival.residual[rows] ** 2 - own.residual[rows] ** 2)) < left:
+            residual[rows] = own.residual[rows]
+    return residual
 
 
 def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: BandNoise) -> bool:

@@ -12,7 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from winchkit.diagnosis.regression.cross_validation import CERTAIN, excess, held_out_rms
+from winchkit.diagnosis.regression.cross_validation import (
+    AT_NOISE,
+    CERTAIN,
+    excess,
+    held_out_rms,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import BandNoise
@@ -53,7 +58,8 @@ def _with_simpler_laws(
         if not term.effect.reduces_to:
             continue
         simpler = settled(with_simpler_law(engine, present, noise, index))
-        if _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO or (
+        is_as_good = _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
+        if (is_as_good and _transfers(engine, simpler, present, noise)) or (
             _is_degenerate(engine, present, noise, index)
             and _lost_share(engine, simpler, present, noise, index) <= CERTAIN
         ):
@@ -96,6 +102,16 @@ def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise)
     now = held_out_rms(engine.regression, present, noise, folds)
     errors = held_out_rms(engine.regression, smaller, noise, folds)
     return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
+
+
+def _transfers(engine: SelectionEngine, simpler: Fit, present: Fit, noise: BandNoise) -> bool:
+    """Whether a simpler model predicts as well as the present one, each by its own folds: a law
+    with fewer shapes is also asked for another load.
+    """
+    now, errors = (
+        engine.held_out_errors(m, noise, engine.folds(m, noise)) for m in (present, simpler)
+    )
+    return all(errors[output] <= AT_NOISE * now[output] for output in now)
 
 
 def _is_missed(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> bool:
