@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term
+from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term, with_channel, without
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import GuideSpec, WinchProfile
 
@@ -178,3 +179,19 @@ def test_a_guide_whose_detour_bends_stands_alone() -> None:
     sign = np.sign(values["offset"].value)
     assert sign * values["offset"].value == pytest.approx(0.02, rel=0.1)
     assert sign * values["mismatch"].value == pytest.approx(-6e-3, rel=0.05)
+
+
+@pytest.mark.parametrize(("size", "sets"), [(0.0, 1), (2e-3, 2)])
+def test_an_error_of_unknown_cause_is_no_evidence_against_a_rival(size: float, sets: int) -> None:
+    """A transmission error would also move the cable, by less than a wave of unknown cause."""
+    hidden = term("torque-ripple", amplitude=0.02, phase=0.3, order=2.0)
+    ride = Ride(samples=1600, stroke=60.0)
+    wave = size * np.sin(2 * np.pi * ride.time / 1.03) ** 3
+    runs = []
+    for seed in range(4):
+        run = without(made(seed, GROOVED, (hidden,), load_mass=10.0, ride=ride), "tension")
+        runs.append(with_channel(run, "cable_length", run["cable_length"] + wave, "m"))
+    candidates = Catalogue(CATALOGUE[n] for n in ("torque-ripple", "gear-transmission-error"))
+    (step,) = diagnose(runs, GROOVED, candidates).diagnosis.steps
+    assert step.effects[0] == "torque-ripple"
+    assert len(step.effects) == sets

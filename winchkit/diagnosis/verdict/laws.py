@@ -59,7 +59,7 @@ def _with_simpler_laws(
             continue
         simpler = settled(with_simpler_law(engine, present, noise, index))
         is_as_good = _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
-        if (is_as_good and _transfers(engine, simpler, present, noise)) or (
+        if (is_as_good and transfers(engine, simpler, present, noise)) or (
             _is_degenerate(engine, present, noise, index)
             and _lost_share(engine, simpler, present, noise, index) <= CERTAIN
         ):
@@ -104,7 +104,7 @@ def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise)
     return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
 
 
-def _transfers(engine: SelectionEngine, simpler: Fit, present: Fit, noise: BandNoise) -> bool:
+def transfers(engine: SelectionEngine, simpler: Fit, present: Fit, noise: BandNoise) -> bool:
     """Whether a simpler model predicts as well as the present one, each by its own folds: a law
     with fewer shapes is also asked for another load.
     """
