@@ -47,6 +47,26 @@ def test_an_inertia_is_bounded_by_torque_and_acceleration(inertia: float, too_la
     assert reason is None or "other effects cancel it" in reason
 
 
+@pytest.mark.parametrize(("share", "cancelled"), [(0.0, False), (0.97, True)])
+def test_a_gain_that_a_share_of_the_torque_cancels_is_not_certain(
+    share: float, cancelled: bool
+) -> None:
+    """A gain and a share of the torque that imitated a five-cornered drum were ± 90 N of 100 N."""
+    engine = engine_for([], Ride(samples=600, rate=10.0), (10.0, 25.0))
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    tension, torque = (
+        np.concatenate([v[ok] for v, ok in engine.regression.measured_samples(output)])
+        for output in ("tension", "motor_torque")
+    )
+    per_torque = 0.3 * float(np.mean(tension) / np.mean(torque))
+    hypothesis = engine.initial_model.with_term(term("cell-gain", gain_error=-0.3), 4)
+    crosstalk = term("cell-crosstalk", share=share * per_torque)
+    fitted = engine.fixed(hypothesis.with_term(crosstalk, 4), noise)
+    reason = oversized(engine.regression, fitted, 0)
+    assert (reason is not None) == cancelled
+    assert reason is None or "most of it is cancelled" in reason
+
+
 @pytest.mark.parametrize(("half_range", "short"), [(np.radians(1.3), True), (0.5, False)])
 def test_a_law_over_a_degree_of_travel_is_not_certain(half_range: float, short: bool) -> None:
     engine = selection_engine(prepare([joint(half_range)], JOINT), load_catalogue())

@@ -21,6 +21,9 @@ from winchkit.quantity_text import quantity
 _LARGEST_RATIO = 2.0
 """Range of an effect's change over that of the output itself, from which other effects must cancel
 it; rule of thumb: a balancer cancels most of a weight."""
+_CANCELLED = 5.0
+"""The same over the range of the change by all effects together, as which most of it is cancelled;
+a gain and a share of the torque that imitated a five-cornered drum had 5.4."""
 _ENDS = 0.01, 0.99
 """Quantiles that are a range: single samples are none."""
 _LEAST_TRAVEL = 0.5
@@ -40,16 +43,21 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
     if not isinstance(regression, TimeSeriesRegression):
         return None
     change = _change_by(regression, fit, index)
+    together = regression.change(fit.hypothesis)
     for output in regression.outputs:
-        own = _range(regression.compared_samples(change, output))
+        unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
+        own, sum_of_all = (
+            _range(regression.compared_samples(each, output)) for each in (change, together)
+        )
         samples = regression.measured_samples(output)
         whole = _range(np.concatenate([values[valid] for values, valid in samples]))
+        changes = f"it changes the {name} by {quantity(own, unit)}, "
         if own > _LARGEST_RATIO * whole:
-            unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
-            return (
-                f"it changes the {name} by {quantity(own, unit)}, which varies by "
-                f"{quantity(whole, unit)}: other effects cancel it"
-            )
+            varies = quantity(whole, unit)
+            return f"{changes}which varies by {varies}: other effects cancel it"
+        if own > _CANCELLED * sum_of_all > 0.0:
+            rest = quantity(sum_of_all, unit)
+            return f"{changes}and all effects together by {rest}: most of it is cancelled"
     return None
 
 

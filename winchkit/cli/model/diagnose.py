@@ -150,11 +150,11 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     if any(step.whole for step in told):
         file = extended_name(asked.profile, "calibrated")
         suggest_next("calibrate", asked.profile, runs, "-o", file)
+    elif diagnosis.verdict == "unknown" and diagnosis.data == "runs":
+        suggest_next("effects", "new", "own.py", "--fit", runs, *words)
     elif first is not None and len(first.effects) == 1:
         file = extended_name(asked.profile, first.effects[0])
         suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
-    elif first is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
-        suggest_next("effects", "new", "own.py", "--fit", runs, *words)
     else:
         suggest_with("plan", asked, runs)
 

@@ -243,7 +243,7 @@ async function drawCard() {
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
-      el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
+      el("div", { class: "buttons" }, el("button", { class: view.diagnosis.verdict === "unknown" ? "" : "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
         el("button", { onclick: planRun }, "Plan a run")));
     if (card.signature) drawSignature(host, card.signature);
   });
