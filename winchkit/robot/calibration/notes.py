@@ -51,6 +51,11 @@ def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> Iterator[str]:
             f"the poses require {' and '.join(found)} to be other than the robot's file has: "
             "fitted beside the geometry. Declare it as unknown in [instrument]"
         )
+    if "frame" in chosen.free - before:
+        yield (
+            "a home pose that is elsewhere looks the same as another frame, but for the priors of "
+            "the exit points: check [home] first"
+        )
     if "frame" in chosen.free:
         own = chosen.equations.robot.profile.instrument.tracker.datum
         kept = {
