@@ -50,7 +50,7 @@ from winchkit.report.words.sentence import (
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
+from winchkit.report.words.steps import alike, doubt_texts, is_small, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -142,7 +142,7 @@ def step_lines(
     """Every step that is reported, the largest share first, with its doubts below.
 
     ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
-    from which further steps are named only.
+    from which further steps are named only, as are small ones.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
@@ -152,7 +152,7 @@ def step_lines(
         own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
-        if most is not None and lines and len(lines) + len(own) > most:
+        if most is not None and lines and (is_small(step) or len(lines) + len(own) > most):
             left_out = [diagnosis.steps[one].effects[0] for one in told[number - 1 :]]
             more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
             return [*lines, *paragraph(more, "", "  ")]

@@ -13,7 +13,8 @@ from scipy.integrate import cumulative_trapezoid
 
 from winchkit import diagnose, read_profile
 from winchkit.arrays import Array
-from winchkit.diagnosis.results import Diagnosis
+from winchkit.diagnosis.results import Diagnosis, Step
+from winchkit.diagnosis.verdict.compensation import beside_unknown
 from winchkit.runs.run import Channel, Run
 
 COULOMB, VISCOUS, QUADRATIC, INERTIA = 0.03, 4e-4, 8e-6, 2e-4
@@ -120,3 +121,14 @@ def test_a_law_that_leaves_its_own_variable_is_open(tmp_path: Path, quadratic: f
             name, true = truth[step.effects[0]]
             assert abs(values[name].value - true) < 4 * values[name].std
     assert bool(doubts(found) & {"curve"}) == bool(quadratic)
+
+
+@pytest.mark.parametrize(("curve", "certain"), [("speed", False), ("drum angle", True), ("", True)])
+def test_a_law_beside_an_unknown_one_over_its_variable_is_not_certain(
+    curve: str, certain: bool
+) -> None:
+    viscous = Step(("motor-viscous",), {}, 0.5, certain=True)
+    other = Step(("friction-growth",), {}, 0.1, law="open", curve=curve)
+    judged = beside_unknown(viscous, [viscous, other], frozenset({"speed"}))
+    assert judged.certain == certain
+    assert bool(judged.doubts) != certain

@@ -49,7 +49,7 @@ def test_one_effect_has_the_change_of_the_error_that_falls_most() -> None:
 def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
     curved = kind("cable-elongation-quartic")
     assert curved == kind("cable-elongation-exponential") == kind("cable-elongation-linear")
-    assert kind("motor-stribeck") == kind("motor-coulomb") != kind("pulley-coulomb")
+    assert kind("pulley-stribeck") == kind("pulley-coulomb") != kind("motor-coulomb")
     assert kind("my-spring") == clause("my-spring")
 
 

@@ -2,9 +2,9 @@
 
 The steps over one variable are replaced by one curve over it, and those of a torque by one factor
 on what the profile predicts, beside the values of the profile's file. Where that explains as much
-with fewer parameters, none of the steps is certain. Where one curve explains nine tenths of the
-excess and the effects of a search together clearly less, they imitate an unknown law: the search
-ends with the closest one.
+with fewer parameters, none of the steps is certain; nor is one beside an open law over its
+variable. Where one curve explains nine tenths of the excess and the effects of a search together
+clearly less, they imitate an unknown law: the search ends with the closest one.
 """
 
 from __future__ import annotations
@@ -97,7 +97,11 @@ def with_compensations(
             what = f"a torque constant that is wrong by {100 * (factor - 1):+.1f} %"
             for place in torque:
                 out[place] = _doubted(out[place], "factor", what, len(torque))
-    return tuple(out)
+    outputs = {place: {*terms[index].effect.outputs} for place, index in at.items()}
+    return tuple(
+        beside_unknown(step, [o for i, o in enumerate(out) if outputs[i] & outputs[place]], own)
+        for (place, step), own in zip(enumerate(out), over.values(), strict=True)
+    )
 
 
 def _doubted(step: Step, code: str, what: str, count: int) -> Step:
@@ -109,6 +113,16 @@ def _doubted(step: Step, code: str, what: str, count: int) -> Step:
         return step  # A curve speaks against it alone.
     law = "open" if code == "curve" else step.law
     return replace(step, law=law, certain=False, doubts=(*step.doubts, Doubt(code, text)))
+
+
+def beside_unknown(step: Step, others: Sequence[Step], variables: frozenset[str]) -> Step:
+    """A step that is not certain beside another one whose open law is over one of its variables."""
+    known = {variable.replace("_", " ") for variable in variables}
+    words = next((other.curve for other in others if other.curve in known), "")
+    if step.curve or not words:
+        return step
+    text = f"the law of another effect over {words} is unknown: its value may contain a part of it"
+    return replace(step, certain=False, doubts=(*step.doubts, Doubt("curve", text)))
 
 
 @dataclass(frozen=True)

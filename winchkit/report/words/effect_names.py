@@ -122,7 +122,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
     ),
     "motor-stribeck": (
         "Stribeck friction of the motor",
-        "the motor side has Coulomb friction with a Stribeck curve",
+        "the friction of the motor side is higher at low speed (Stribeck)",
     ),
     "motor-viscous": ("viscous friction of the motor", "the motor side has viscous friction"),
     "motor-viscous-asymmetry": (

@@ -30,7 +30,8 @@ _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
 _NEGLIGIBLE = 0.01
-"""Share of the excess below which a refitted value that agrees with the file's is not reported."""
+"""Share of the excess below which a refitted value that agrees with the file's is not reported, and
+a doubtful effect is named only."""
 _NORMAL_95 = 1.96
 """Standard deviations on each side of a 95 % interval, where none was computed."""
 _D = TypeVar("_D", bound=Diagnosis)
@@ -67,6 +68,11 @@ def _is_negligible(step: Step) -> bool:
     return all(_agrees(estimate, step.file_values[name]) for name, estimate in sizes.items())
 
 
+def is_small(step: Step) -> bool:
+    """Whether an addition is doubtful and explains less than a hundredth of the excess."""
+    return not step.certain and not step.refitted and step.share < _NEGLIGIBLE
+
+
 def _agrees(estimate: Estimate, file_value: float) -> bool:
     """Whether the 95 % interval of a value holds that of the file."""
     half = _NORMAL_95 * estimate.std
@@ -83,8 +89,8 @@ def cause(steps: Sequence[Step]) -> str:
         return first
     if not added:
         return f"{refitted} effects of the profile have other values; first, {first}"
-    one = len(added) == 1
-    text = first if one else f"{len(added)} effects are missing; first, {first}"
+    count = sum(not is_small(step) for step in added)
+    text = first if count <= 1 else f"{count} effects are missing; first, {first}"
     if refitted:
         have = "effect of the profile has" if refitted == 1 else "effects of the profile have"
         text += f"; {refitted} {have} other values"
