@@ -93,7 +93,7 @@ def test_the_shape_of_a_residual_is_drawn_over_its_variable() -> None:
 
 def test_every_step_has_the_error_without_it_and_its_share() -> None:
     answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
-    text = " ".join(report_text(answer).split())
+    text = " ".join(report_text(answer, verbose=True).split())
     found = zip(answer.diagnosis.steps, errors_without(answer), strict=True)
     outputs = {"cable-elongation-linear": "cable_length", "motor-coulomb": "motor_torque"}
     for step, without in found:

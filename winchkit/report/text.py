@@ -50,7 +50,7 @@ from winchkit.report.words.sentence import (
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, is_small, reported_steps, step_text
+from winchkit.report.words.steps import alike, doubt_texts, named_only, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -147,12 +147,13 @@ def step_lines(
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
     told = reported_steps(diagnosis)
+    small = named_only([diagnosis.steps[index] for index in told])
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
         own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
-        if most is not None and lines and (is_small(step) or len(lines) + len(own) > most):
+        if most is not None and lines and (step in small or len(lines) + len(own) > most):
             left_out = [diagnosis.steps[one].effects[0] for one in told[number - 1 :]]
             more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
             return [*lines, *paragraph(more, "", "  ")]

@@ -16,6 +16,7 @@ from winchkit.report.words.steps import (
     cause,
     doubt_texts,
     lowered_most,
+    named_only,
     reported_steps,
     step_text,
     step_title,
@@ -172,3 +173,14 @@ def test_a_refit_alone_is_reported_where_it_makes_the_verdict() -> None:
     unknown = diagnosis_of("unknown", same)
     assert reported_steps(unknown) == []
     assert headline(unknown).startswith("No known effect explains")
+
+
+@pytest.mark.parametrize(("share", "count"), [(0.97, 1), (0.03, 0)])
+def test_small_doubtful_effects_are_named_only_beside_what_explains_nearly_all(
+    share: float, count: int
+) -> None:
+    """Laws that overlap have small shares each, and together explain all."""
+    main = replace(FRICTION, certain=True, share=share)
+    small = replace(ELASTIC, certain=False, share=0.002)
+    assert len(named_only([main, small])) == count
+    assert ("2 effects" in cause([main, small])) == (count == 0)

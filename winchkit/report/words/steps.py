@@ -32,6 +32,9 @@ _WHOLE = "the geometry of the robot differs as a whole"
 _NEGLIGIBLE = 0.01
 """Share of the excess below which a refitted value that agrees with the file's is not reported, and
 a doubtful effect is named only."""
+_MAIN = 0.9
+"""Share of the excess that the others explain where small effects are named only; that of
+``explained``."""
 _NORMAL_95 = 1.96
 """Standard deviations on each side of a 95 % interval, where none was computed."""
 _D = TypeVar("_D", bound=Diagnosis)
@@ -68,9 +71,13 @@ def _is_negligible(step: Step) -> bool:
     return all(_agrees(estimate, step.file_values[name]) for name, estimate in sizes.items())
 
 
-def is_small(step: Step) -> bool:
-    """Whether an addition is doubtful and explains less than a hundredth of the excess."""
-    return not step.certain and not step.refitted and step.share < _NEGLIGIBLE
+def named_only(steps: Sequence[Step]) -> list[Step]:
+    """Additions that are doubtful and explain less than a hundredth of the excess each, where the
+    others explain nine tenths without them: overlapping laws have small shares as well.
+    """
+    small = [s for s in steps if not s.certain and not s.refitted and s.share < _NEGLIGIBLE]
+    main = sum(step.share for step in steps if step not in small)
+    return small if main > _MAIN else []
 
 
 def _agrees(estimate: Estimate, file_value: float) -> bool:
@@ -89,7 +96,7 @@ def cause(steps: Sequence[Step]) -> str:
         return first
     if not added:
         return f"{refitted} effects of the profile have other values; first, {first}"
-    count = sum(not is_small(step) for step in added)
+    count = len(added) - len(named_only(steps))
     text = first if count <= 1 else f"{count} effects are missing; first, {first}"
     if refitted:
         have = "effect of the profile has" if refitted == 1 else "effects of the profile have"
