@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import CATALOGUE, GROOVED, SPIRAL, Ride, made, term, with_channel, without
+from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.catalogue import Catalogue
@@ -195,3 +196,25 @@ def test_an_error_of_unknown_cause_is_no_evidence_against_a_rival(size: float, s
     (step,) = diagnose(runs, GROOVED, candidates).diagnosis.steps
     assert step.effects[0] == "torque-ripple"
     assert len(step.effects) == sets
+
+
+class Straight(Ride):
+    """A motion in one direction at one speed."""
+
+    @property
+    def angle(self) -> Array:
+        return np.asarray(self.stroke * self.time / self.time[-1])
+
+
+def test_a_rival_with_more_parameters_stays_unless_it_contains_the_law() -> None:
+    """At one speed a spring over the angle is a friction that grows with time."""
+    spring = term("spring-balancer", stiffness=2e-4, torque=0.0)
+    runs = [
+        made(int(mass) + seed, GROOVED, (spring,), load_mass=mass, ride=Straight())
+        for mass in (10.0, 25.0)
+        for seed in range(2)
+    ]
+    candidates = Catalogue(CATALOGUE[n] for n in ("spring-balancer", "friction-growth"))
+    (step,) = diagnose(runs, GROOVED, candidates).diagnosis.steps
+    assert set(step.effects) == {"spring-balancer", "friction-growth"}
+    assert not step.certain

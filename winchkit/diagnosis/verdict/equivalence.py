@@ -127,10 +127,8 @@ def equivalence_set(
             engine, judged, losses, dispersed
         )
         member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
-        if _is_listed(own.effect, member.term.effect):
-            joins = not worse
-        else:
-            joins = not worse and not _adds_nothing(member, members[0])
+        nested = own.effect.nested_with(member.term.effect)
+        joins = not worse and not (nested and _adds_nothing(member, members[0]))
         if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(member)
         else:
@@ -239,12 +237,6 @@ def _beside_another(
         both = engine.refit(others.with_term(term, engine.regression.n_runs), noise)
         return _Member(both.hypothesis.terms[-1], both, both)
     return None
-
-
-def _is_listed(own: Effect, rival: Effect) -> bool:
-    """Whether the catalogue lists two effects as confusable, neither being a case of the other."""
-    listed = rival.id in own.confused_with or own.id in rival.confused_with
-    return listed and not own.nested_with(rival)
 
 
 def _adds_nothing(rich: _Member, simple: _Member) -> bool:
