@@ -99,7 +99,7 @@ def with_compensations(
                 out[place] = _doubted(out[place], "factor", what, len(torque))
     outputs = {place: {*terms[index].effect.outputs} for place, index in at.items()}
     return tuple(
-        beside_unknown(step, [o for i, o in enumerate(out) if outputs[i] & outputs[place]], own)
+        beside_unknown(step, [o for i, o in enumerate(out) if outputs[i] <= outputs[place]], own)
         for (place, step), own in zip(enumerate(out), over.values(), strict=True)
     )
 
