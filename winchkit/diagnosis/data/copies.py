@@ -24,8 +24,9 @@ from winchkit.runs.sanity.quantisation import resolution
 from winchkit.schema.profiles.winch import WinchProfile
 
 COPIES = "repeats-are-copies"
-_DEPENDENT = 0.1
-"""Median difference over the noise of one recording; of independent ones it is 0.95."""
+_DEPENDENT = 0.3
+"""Median difference over the noise of one recording; of a copy that is rounded to its noise it is
+0.25, of independent ones 0.95."""
 _LEAST_OVERLAP = 0.5
 """Share of the shorter run's rows from which it is left out as a copy; screened."""
 _LEAST_ROWS = 50
@@ -75,7 +76,7 @@ def without_copies(
 
     Rows are compared by number, since stamps may differ, at the lag at which the differences of an
     output correlate most, with every row of the longer run or every k-th. A copy has in every
-    output a median absolute difference, less an offset, below a tenth of the noise of either run.
+    output a median absolute difference, less an offset, below 0.3 of the noise of either run.
     An output whose resolution exceeds its noise shows nothing, since independent recordings are
     rounded alike.
     """
