@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from math import isinf, isnan
+from textwrap import indent
 
-from winchkit.dynamics.expression import Expression, Operation, ordered, statements
+from winchkit.dynamics.expression import Expression, Operation, derivative, ordered, statements
 from winchkit.dynamics.step import (
     BEFORE,
     OUTPUTS,
@@ -77,15 +78,25 @@ static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *le
 /* At rest: motor angle (rad) at a length (m) under a load (N), by Newton from the nominal line. */
 static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
 {{
-{nominal}    for (int i = 0; i < 5; ++i) {{
-        {p}_real there, arm;
-        {p}_at_rest(angle, load, &there, &arm);
-        angle += (there - length) / arm;
+    {p}_real angle;
+    (void)load;
+    {{
+{nominal}    }}
+    for (int i = 0; i < 5; ++i) {{
+        {p}_real there, slope, step;
+        {{
+{newton}        }}
+        angle += step = (length - there) / slope;
+        if ({P}_F(fabs)(step) < ({p}_real){settled} * (1 + {P}_F(fabs)(angle)))
+            break;
     }}
     return angle;
 }}
 
 """
+_SETTLED = 1e-13
+"""Newton step, as a share, that ends the iteration; rounding makes 1e-15. The next step is smaller
+by a tenth at least: at a new layer the slope of a drum jumps by a share of its radius."""
 
 
 def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
@@ -116,8 +127,14 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
     out.append(_STEP.format(**fields, starts=starts, body=body))
     if not isinstance(profile, AxisProfile):
         rest = c_body(p, step.at_rest, ["*length", "*arm"], constants)
-        nominal = c_body(p, [step.nominal_angle], [f"{p}_real angle"], constants)
-        out.append(_AT_REST.format(**fields, rest=rest, nominal=nominal))
+        slope = derivative(step.at_rest[0], "motor_angle")
+        at_angle = constants | {"motor_angle": "angle"}
+        newton = c_body(p, [step.at_rest[0], slope], ["there", "slope"], at_angle)
+        nominal = c_body(p, [step.nominal_angle], ["angle"], constants)
+        out.append(_AT_REST.format(
+            **fields, rest=rest, nominal=indent(nominal, " " * 4), newton=indent(newton, " " * 8),
+            settled=_SETTLED,
+        ))  # fmt: skip
     return "".join([*out, "#endif\n"])
 
 

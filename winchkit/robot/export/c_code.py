@@ -100,6 +100,18 @@ static inline void {p}_motor_angles(const {p}_real *length, const {p}_real *forc
 """
 _FORCES = """\
 
+static inline {p}_real {p}_dot(const {p}_real *a, const {p}_real *b)
+{{
+    {p}_real even = 0, odd = 0; /* Two sums: a processor adds them at the same time. */
+    for (int i = 0; i + 1 < {P}_LINES; i += 2) {{
+        even += a[i] * b[i];
+        odd += a[i + 1] * b[i + 1];
+    }}
+    if ({P}_LINES % 2)
+        even += a[{P}_LINES - 1] * b[{P}_LINES - 1];
+    return even + odd;
+}}
+
 /* Cable forces, N, that balance a wrench and are nearest to the middle of their limits (closed
    form). Returns 1 where they are within the limits, else 0; NAN in a singular pose. */
 static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
@@ -110,29 +122,22 @@ static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
     for (int i = 0; i < {P}_LINES; ++i)
         force[i] = (low[i] + high[i]) / 2;
     for (int j = 0; j < {P}_FREE; ++j) {{
-        {p}_real whole = 0, left;
-        missing[j] = wrench[{p}_free[j]];
-        for (int i = 0; i < {P}_LINES; ++i) {{
+        {p}_real whole, left, inverse;
+        for (int i = 0; i < {P}_LINES; ++i)
             q[j][i] = structure[6 * i + {p}_free[j]];
-            missing[j] += q[j][i] * force[i];
-            whole += q[j][i] * q[j][i];
-        }}
+        missing[j] = wrench[{p}_free[j]] + {p}_dot(q[j], force);
+        whole = left = {p}_dot(q[j], q[j]);
         for (int k = 0; k < j; ++k)
             r[j][k] = 0;
-        left = whole;
-        for (int pass = 0; pass < 2; ++pass) {{
+        for (int pass = 0; pass < 2 && j; ++pass) {{
             const {p}_real before = left;
-            for (int k = 0; k < j; ++k) {{
-                {p}_real along = 0;
+            {p}_real along[{P}_FREE];
+            for (int k = 0; k < j; ++k)
+                r[j][k] += along[k] = {p}_dot(q[k], q[j]);
+            for (int k = 0; k < j; ++k)
                 for (int i = 0; i < {P}_LINES; ++i)
-                    along += q[k][i] * q[j][i];
-                for (int i = 0; i < {P}_LINES; ++i)
-                    q[j][i] -= along * q[k][i];
-                r[j][k] += along;
-            }}
-            left = 0;
-            for (int i = 0; i < {P}_LINES; ++i)
-                left += q[j][i] * q[j][i];
+                    q[j][i] -= along[k] * q[k][i];
+            left = {p}_dot(q[j], q[j]);
             if (4 * left > before) /* Little was taken away: little of it was rounding. */
                 break;
         }}
@@ -142,8 +147,9 @@ static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
             return 0;
         }}
         r[j][j] = {P}_F(sqrt)(left);
+        inverse = 1 / r[j][j];
         for (int i = 0; i < {P}_LINES; ++i)
-            q[j][i] /= r[j][j];
+            q[j][i] *= inverse;
     }}
     for (int j = 0; j < {P}_FREE; ++j) {{
         for (int k = 0; k < j; ++k)
