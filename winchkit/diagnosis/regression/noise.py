@@ -14,7 +14,7 @@ Whittle likelihood. J. Am. Stat. Assoc. 89, 600-610.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -57,6 +57,18 @@ class BandNoise:
     def inverse_sigma(self, regression: Regression) -> Array:
         """1/σ of every row, shape (n_rows,)."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
+
+    def with_outputs(
+        self, outputs: Container[str], other: BandNoise, regression: Regression
+    ) -> BandNoise:
+        """The same with the variance of some outputs from another estimate."""
+        theirs = np.array([band[0] in outputs for band in regression.bands])
+        return replace(
+            self,
+            power=np.where(theirs, other.power, self.power),
+            dof=np.where(theirs, other.dof, self.dof),
+            rms={o: (other if o in outputs else self).rms[o] for o in self.rms},
+        )
 
     def uncertainty(self, regression: Regression) -> dict[str, float]:
         """Relative uncertainty (two standard deviations) of the mean square per output; coloured

@@ -18,7 +18,12 @@ from winchkit.diagnosis.regression.lack_of_fit import (
     lack_of_fit_test,
     output_p_values,
 )
-from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.noise import (
+    BandNoise,
+    noise_from_repeats,
+    noise_saturated,
+    replicate_rms,
+)
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.candidates import with_grid, with_grid_points
@@ -62,12 +67,18 @@ class TimeSeriesSelection(SelectionEngine):
         super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
-        """Noise from the contrasts of repeats; without repeats from the saturated model."""
-        if self.regression.replicates:
-            offsets = jacobian[:, : self.regression.n_run_offsets]
-            own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
-            return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
-        return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        """Noise from the contrasts of repeats; from the saturated model without repeats, and of an
+        output that no repeats have."""
+        if not self.regression.replicates:
+            return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        offsets = jacobian[:, : self.regression.n_run_offsets]
+        own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
+        noise = noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
+        alone = set(self.regression.outputs) - set(replicate_rms(self.regression, residual))
+        if not alone:
+            return noise
+        beside = noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        return noise.with_outputs(alone, beside, self.regression)
 
     @property
     def profile(self) -> WinchProfile:
