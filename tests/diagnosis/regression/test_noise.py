@@ -108,6 +108,17 @@ def test_an_output_that_no_repeats_have_gets_its_noise_from_the_other_effects() 
     assert found.outputs["tension"].noise_rms == pytest.approx(NOISE["tension"], rel=0.05)
 
 
+def test_the_lowest_frequencies_of_a_long_run_get_their_noise_from_the_other_effects() -> None:
+    """They are below those of the short repeats beside it, which tell nothing of the noise there;
+    with less than a degree of freedom no effect would be significant."""
+    ride = Ride(samples=400, stroke=60.0)
+    repeats = [made(seed, ride=ride) for seed in range(2)]
+    longer = made(5, load_mass=20.0, ride=replace(ride, samples=4000, period=40.0))
+    noise = diagnose([*repeats, longer], GROOVED).result.noise
+    assert noise.dof.min() > 1.9
+    assert noise.rms["cable_length"] == pytest.approx(NOISE["cable_length"], rel=0.1)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("colour", [False, True], ids=["white", "coloured"])
 def test_p_values_of_noise_alone_are_uniform(colour: bool) -> None:

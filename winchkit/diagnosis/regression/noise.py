@@ -14,7 +14,7 @@ Whittle likelihood. J. Am. Stat. Assoc. 89, 600-610.
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -58,17 +58,15 @@ class BandNoise:
         """1/σ of every row, shape (n_rows,)."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
 
-    def with_outputs(
-        self, outputs: Container[str], other: BandNoise, regression: Regression
+    def with_bands(
+        self, theirs: NDArray[np.bool_], other: BandNoise, regression: Regression
     ) -> BandNoise:
-        """The same with the variance of some outputs from another estimate."""
-        theirs = np.array([band[0] in outputs for band in regression.bands])
-        return replace(
-            self,
-            power=np.where(theirs, other.power, self.power),
-            dof=np.where(theirs, other.dof, self.dof),
-            rms={o: (other if o in outputs else self).rms[o] for o in self.rms},
-        )
+        """The same where the variance of some bands, (n_bands,), is at least another estimate, with
+        its degrees of freedom: either may be too small, by what its neighbours or the candidates
+        explain."""
+        power = np.where(theirs, np.maximum(self.power, other.power), self.power)
+        dof = np.where(theirs, other.dof, self.dof)
+        return replace(self, power=power, dof=dof, rms=_rms(regression, power))
 
     def uncertainty(self, regression: Regression) -> dict[str, float]:
         """Relative uncertainty (two standard deviations) of the mean square per output; coloured

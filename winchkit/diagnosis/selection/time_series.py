@@ -18,12 +18,7 @@ from winchkit.diagnosis.regression.lack_of_fit import (
     lack_of_fit_test,
     output_p_values,
 )
-from winchkit.diagnosis.regression.noise import (
-    BandNoise,
-    noise_from_repeats,
-    noise_saturated,
-    replicate_rms,
-)
+from winchkit.diagnosis.regression.noise import BandNoise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.candidates import with_grid, with_grid_points
@@ -48,6 +43,9 @@ _MOST_PEAKS = 12
 """Orders that enter the grids in one scan of all effects with an order; computing cost; further
 ones are found by the harmonic series and by later scans."""
 
+_LEAST_DOF = 2.0
+"""Degrees of freedom of the noise of a band from which repeats tell it: F has no mean below."""
+
 
 class TimeSeriesSelection(SelectionEngine):
     """Selection among hypotheses on a winch's runs, from the profile's own effects on."""
@@ -67,18 +65,18 @@ class TimeSeriesSelection(SelectionEngine):
         super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
-        """Noise from the contrasts of repeats; from the saturated model without repeats, and of an
-        output that no repeats have."""
+        """Noise from the contrasts of repeats; from the saturated model without repeats, and in the
+        bands that they do not tell: of an output that none has, or below their lowest frequency."""
         if not self.regression.replicates:
             return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
         offsets = jacobian[:, : self.regression.n_run_offsets]
         own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
         noise = noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
-        alone = set(self.regression.outputs) - set(replicate_rms(self.regression, residual))
-        if not alone:
+        few = noise.dof < _LEAST_DOF
+        if not few.any():
             return noise
         beside = noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
-        return noise.with_outputs(alone, beside, self.regression)
+        return noise.with_bands(few, beside, self.regression)
 
     @property
     def profile(self) -> WinchProfile:
