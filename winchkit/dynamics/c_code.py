@@ -174,21 +174,31 @@ def c_body(
     return body + "".join(f"    {target} = r{i};\n" for i, target in enumerate(targets))
 
 
-def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
-    """The same step as plain data: constants, and assignments ``[name, operation, arguments]``."""
-    step = step_of(profile, terms)
-    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
-    names, inputs = {id(x): "" for x in roots}, inputs_of(profile)
-    own = {BEFORE * past + n: BEFORE * past + name
-           for n, (name, *_) in inputs.items() for past in (0, 1)}  # fmt: skip
+def assigned(
+    roots: Sequence[Expression], names: Mapping[str, str]
+) -> tuple[list[list[object]], list[str]]:
+    """Assignments ``[name, operation, arguments]`` that compute expressions, and the name or number
+    of each; ``names`` are of their symbols."""
+    values: dict[int, str] = {}
     assignments: list[list[object]] = []
     for x in ordered(roots):
         if not x.arguments:
-            names[id(x)] = own.get(x.name, x.name) or repr(x.value)
+            values[id(x)] = names.get(x.name, x.name) or repr(x.value)
             continue
-        names[id(x)] = f"t{len(assignments)}"
-        arguments = [names[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
-        assignments.append([names[id(x)], x.operation, *arguments])
+        values[id(x)] = f"t{len(assignments)}"
+        arguments = [values[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
+        assignments.append([values[id(x)], x.operation, *arguments])
+    return assignments, [values[id(x)] for x in roots]
+
+
+def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
+    """The same step as plain data: constants, and its assignments."""
+    step, inputs = step_of(profile, terms), inputs_of(profile)
+    own = {BEFORE * past + n: BEFORE * past + name
+           for n, (name, *_) in inputs.items() for past in (0, 1)}  # fmt: skip
+    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
+    assignments, values = assigned(roots, own)
+    after = values[len(step.outputs) :]
     return {
         "schema": 1,
         "profile": profile.name,
@@ -197,7 +207,8 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
         "constants": {c.name: {"value": c.value, "unit": c.unit, "source": c.source}
                       for c in step.constants},
         "assignments": assignments,
-        "outputs": {n: {"value": names[id(x)], "unit": OUTPUTS[n][0]}
-                    for n, x in step.outputs.items()},
-        "memory": {m.name: {"start": m.start, "next": names[id(m.after)]} for m in step.memories},
+        "outputs": {n: {"value": x, "unit": OUTPUTS[n][0]}
+                    for n, x in zip(step.outputs, values, strict=False)},
+        "memory": {m.name: {"start": m.start, "next": x}
+                   for m, x in zip(step.memories, after, strict=True)},
     }  # fmt: skip

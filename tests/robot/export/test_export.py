@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from dataclasses import replace
@@ -15,6 +16,7 @@ from scipy.interpolate import CubicSpline
 
 from winchkit import export_model, find
 from winchkit.dynamics.c_code import identifier
+from winchkit.dynamics.expression import OPERATIONS
 from winchkit.errors import UsageError
 from winchkit.model.rotation import quaternion_of, rotation_by
 from winchkit.robot import ForceLimits, Pose
@@ -214,6 +216,26 @@ def test_a_robot_without_masses_or_stiffness_is_refused() -> None:
         export_model(replace(movable("cabtive"), effect=()), "mjcf")
 
 
+def test_the_json_has_the_formulas_of_a_cable_and_of_its_winch() -> None:
+    profile = robot_profile("cabtive")
+    robot = robot_with_effects(profile)
+    pose, found = random_poses(robot, 3, 8), export_model(profile, "json")
+    data = json.loads(found.text)
+    assert [one.split(":")[0] for one in found.missing] == ["force distribution"]
+    assert data["lines"]["1"]["winch"]["profile"] == "cabtive-1"
+    for i, (position, rotation) in enumerate(zip(pose.position, pose.rotation, strict=True)):
+        for k, line in enumerate(data["lines"].values()):
+            given = {"position": position, "rotation": rotation.ravel(), "at": line["at"]}
+            known = {f"{n}[{j}]": float(x) for n, row in given.items() for j, x in enumerate(row)}
+            for name, operation, *arguments in data["assignments"]:
+                values = [known[a] if isinstance(a, str) else a for a in arguments]
+                known[name] = OPERATIONS[operation].evaluate(*values)
+            outputs = data["outputs"]
+            assert known[outputs["length"]["value"]] == pytest.approx(robot.lengths(pose)[i, k])
+            column = [known[one] for one in outputs["column"]["value"]]
+            assert column == pytest.approx(robot.structure(pose)[i, :, k], abs=1e-12)
+
+
 def test_too_few_cables_have_no_force_distribution() -> None:
     found = export_model(read_robot(find("profiles", "hanging-4")), "c")
     assert any(one.startswith("force distribution") for one in found.missing)
@@ -222,7 +244,7 @@ def test_too_few_cables_have_no_force_distribution() -> None:
 
 def test_forms_that_a_robot_has_not_are_refused_by_name() -> None:
     profile = read_robot(find("profiles", "cabtive"))
-    with pytest.raises(UsageError, match="is written as c or mjcf, not as 'python'"):
+    with pytest.raises(UsageError, match="is written as c, mjcf or json, not as 'python'"):
         export_model(profile, "python")
     with pytest.raises(UsageError, match="the mass on its cables is that of"):
         export_model(profile, "c", load_mass=3.0)

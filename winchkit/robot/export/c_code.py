@@ -173,9 +173,6 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
     :func:`~winchkit.dynamics.step.step_of`."""
     p, place = identifier(robot.profile.name), robot.geometry
     rows = np.flatnonzero(place.free).tolist()
-    numbers = np.hstack(
-        [place.exit_point, place.anchor_point, place.swivel_axis, place.swivel_radius[:, None]]
-    )
     mass, centre = robot.platform.mass, robot.platform.center_of_mass
     x, y, z = (c_literal(float(one), p) for one in centre)
     angles = "".join(
@@ -192,7 +189,7 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
         "rows": ", ".join(map(str, rows)),
         "geometry": "".join(
             f"    {{{', '.join(map(repr, row))}}}, /* line {name} */\n"
-            for row, name in zip(numbers.tolist(), robot.names, strict=True)
+            for row, name in zip(line_numbers(place), robot.names, strict=True)
         ),
         "cable": _cable(p, place.free),
         "weight": c_literal(-mass * GRAVITY, p),
@@ -214,22 +211,36 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
     return text + "\n#endif\n", missing
 
 
-def _cable(p: str, free: Array) -> str:
-    """Length and column of one cable, recorded on symbols."""
+def cable_formulas(free: Array) -> tuple[list[Expression], dict[str, str]]:
+    """Length and column of the structure matrix of one cable, recorded on symbols, and the place of
+    each symbol: numbers of the line ``at[…]``, of the pose ``position[…]`` and ``rotation[…]``."""
     names: dict[str, str] = {}
 
     def symbols(of: str, count: int) -> list[Expression]:
         names.update((f"{of}{k}", f"{of}[{k}]") for k in range(count))
         return [symbol(f"{of}{k}") for k in range(count)]
 
-    at = symbols("at", 10)
-    position, turned = symbols("pose->position", 3), symbols("pose->rotation", 9)
+    at, position, turned = symbols("at", 10), symbols("position", 3), symbols("rotation", 9)
     geometry = Geometry(
         traced([at[:3]]), traced([at[3:6]]), traced([at[9]]), traced([at[6:9]]), free
     )
     rotation: Any = traced(turned).reshape(1, 3, 3)
     length, by = linearised(geometry, traced([position]), rotation)
     parts = [length, *(-part[0, 0, k] for part in (by.position, by.rotation) for k in range(3))]
-    roots = [expression(one) for one in parts]
-    targets = ["*length", *(f"column[{j}]" for j in range(6))]
-    return c_body(p, roots, targets, names)
+    return [expression(one) for one in parts], names
+
+
+def _cable(p: str, free: Array) -> str:
+    """The formulas of one cable in C."""
+    roots, names = cable_formulas(free)
+    of_pose = {
+        n: place if place.startswith("at") else f"pose->{place}" for n, place in names.items()
+    }
+    return c_body(p, roots, ["*length", *(f"column[{j}]" for j in range(6))], of_pose)
+
+
+def line_numbers(place: Geometry) -> list[list[float]]:
+    """Numbers of each line: exit point, anchor point, swivel axis, swivel radius."""
+    parts = [place.exit_point, place.anchor_point, place.swivel_axis, place.swivel_radius[:, None]]
+    numbers: list[list[float]] = np.hstack(parts).tolist()
+    return numbers
