@@ -109,7 +109,7 @@ def test_an_output_that_no_repeats_have_gets_its_noise_from_the_other_effects() 
 
 
 def test_the_lowest_frequencies_of_a_long_run_get_their_noise_from_the_other_effects() -> None:
-    """They are below those of the short repeats beside it, which tell nothing of the noise there;
+    """They are below those of the short repeats beside it, which have no noise there;
     with less than a degree of freedom no effect would be significant."""
     ride = Ride(samples=400, stroke=60.0)
     repeats = [made(seed, ride=ride) for seed in range(2)]

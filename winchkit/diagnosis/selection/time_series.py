@@ -44,7 +44,7 @@ _MOST_PEAKS = 12
 ones are found by the harmonic series and by later scans."""
 
 _LEAST_DOF = 2.0
-"""Degrees of freedom of the noise of a band from which repeats tell it: F has no mean below."""
+"""Degrees of freedom from which the noise of a band is that of repeats: F has no mean below."""
 
 
 class TimeSeriesSelection(SelectionEngine):
@@ -66,7 +66,7 @@ class TimeSeriesSelection(SelectionEngine):
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Noise from the contrasts of repeats; from the saturated model without repeats, and in the
-        bands that they do not tell: of an output that none has, or below their lowest frequency."""
+        bands without repeats: of an output that none has, or below their lowest frequency."""
         if not self.regression.replicates:
             return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
         offsets = jacobian[:, : self.regression.n_run_offsets]
