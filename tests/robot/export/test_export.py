@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+import export_tick
 from winchkit import export_model, find
 from winchkit.dynamics.c_code import identifier
 from winchkit.dynamics.expression import OPERATIONS
@@ -131,6 +132,13 @@ def test_the_compiled_header_is_the_robot(tmp_path: Path, name: str, count: int)
     wanted = by_python(profile, some)[:-1]
     for own, other in zip(by_c(tmp_path, profile, some, "float"), wanted, strict=False):
         assert np.max(np.abs(own - other)) <= 1e-5 * np.max(np.abs(other))
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_the_benchmark_times_every_part_of_a_tick() -> None:
+    found = export_tick.measured("cabtive", "float")
+    assert set(found) == {*export_tick.PARTS, export_tick.WHOLE, export_tick.STEPS}
+    assert all(0 < seconds < 1e-3 for seconds in found.values())
 
 
 def movable(name: str) -> RobotProfile:
