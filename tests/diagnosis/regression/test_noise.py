@@ -106,6 +106,8 @@ def test_an_output_that_no_repeats_have_gets_its_noise_from_the_other_effects() 
     found = diagnose([*repeats, weighed], GROOVED).diagnosis
     assert [step.effects for step in found.steps] == [("motor-coulomb",)]
     assert found.outputs["tension"].noise_rms == pytest.approx(NOISE["tension"], rel=0.05)
+    sources = [found.outputs[name].noise_source for name in ("tension", "motor_torque")]
+    assert sources == ["saturated fit", "repeats"]
 
 
 def test_the_lowest_frequencies_of_a_long_run_get_their_noise_from_the_other_effects() -> None:
