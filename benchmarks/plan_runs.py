@@ -208,7 +208,13 @@ def answer_of(random: Random, scene: Scene, folder: Path) -> WinchAnswer:
         scene.bench, situations=scene.runs, programmes=_programmes(scene.runs), colour=0.0
     )
     folder.mkdir(parents=True, exist_ok=True)
-    paths = write(recordings(random, {"": bench}, {"": scene.hidden}), folder)
+    recorded = recordings(random, {"": bench}, {"": scene.hidden})
+    for index, run in enumerate(scene.runs):
+        if run is not scene.runs[0]:
+            # The programme asks for its load, whose mass 'winchkit run' writes to the file.
+            metadata = {**recorded[index].metadata, "load_mass": f"{run.mass} kg"}
+            recorded[index] = replace(recorded[index], metadata=metadata)
+    paths = write(recorded, folder)
     profile = folder / "winch.toml"
     write_profile(bench.winch, profile)
     found = diagnose([read_run(path) for path in paths], read_profile(profile))

@@ -47,12 +47,13 @@ def lag(x: Array, time: Array, constant: float, start: float) -> Array:
 def stack(wound: Array, strain: Array) -> Array:
     """Length by which cable wound in at ``strain`` is longer than cable at rest, while on the drum.
 
-    ``wound`` in m; pieces are laid on a stack and taken off again in reverse order. What was
-    there at the start has the run's mean strain.
+    ``wound`` in m since the reference; pieces are laid on a stack and taken off again in reverse
+    order. What was there at the start, as far as the reference, has the run's mean strain.
     """
     before = float(np.mean(strain))
     pieces: list[tuple[float, float]] = []
-    held, out = 0.0, [0.0]
+    held = before * float(wound[0])
+    out = [held]
     for step, now in zip(np.diff(wound).tolist(), strain[1:].tolist(), strict=True):
         if step > 0:
             pieces.append((step, now))

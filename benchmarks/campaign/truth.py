@@ -138,7 +138,9 @@ class _Line:
             w = p["mass_per_length"] * G * np.cos(np.radians(self.winch.inclination))
             length = length - w**2 * free**3 / (24 * load**2)
         if p := self.get("drum-winding-tension"):
-            length = length + stack(-free, p["fraction"] * load / 500.0)
+            length = length + stack(
+                self.winch.length_reference - free, p["fraction"] * load / 500.0
+            )
         if p := self.get("frame-compliance"):
             length = length + load / p["stiffness"]
         if p := self.get("outside-joint"):

@@ -75,6 +75,7 @@ def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
 
 NOT_RUN = {
     "needs a CAN adapter": "docs/commands.md",
+    "needs Pinocchio": "docs/howto/own-model.md",
     "asks a person beside the winch": "docs/commands.md",
     "the answer depends on the computer": "docs/realtime.md",
     "needs the drive": "docs/howto/drive.md",

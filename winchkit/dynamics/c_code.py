@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from math import isinf, isnan
+from textwrap import indent
 
-from winchkit.dynamics.expression import Expression, Operation, ordered, statements
+from winchkit.dynamics.expression import Expression, Operation, derivative, ordered, statements
 from winchkit.dynamics.step import (
     BEFORE,
     OUTPUTS,
@@ -77,15 +78,25 @@ static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *le
 /* At rest: motor angle (rad) at a length (m) under a load (N), by Newton from the nominal line. */
 static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
 {{
-{nominal}    for (int i = 0; i < 5; ++i) {{
-        {p}_real there, arm;
-        {p}_at_rest(angle, load, &there, &arm);
-        angle += (there - length) / arm;
+    {p}_real angle;
+    (void)load;
+    {{
+{nominal}    }}
+    for (int i = 0; i < 5; ++i) {{
+        {p}_real there, slope, step;
+        {{
+{newton}        }}
+        angle += step = (length - there) / slope;
+        if ({P}_F(fabs)(step) < ({p}_real){settled} * (1 + {P}_F(fabs)(angle)))
+            break;
     }}
     return angle;
 }}
 
 """
+_SETTLED = 1e-13
+"""Newton step, as a share, that ends the iteration; rounding makes 1e-15. The next step is smaller
+by a tenth at least: at a new layer the slope of a drum jumps by a share of its radius."""
 
 
 def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
@@ -116,8 +127,14 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
     out.append(_STEP.format(**fields, starts=starts, body=body))
     if not isinstance(profile, AxisProfile):
         rest = c_body(p, step.at_rest, ["*length", "*arm"], constants)
-        nominal = c_body(p, [step.nominal_angle], [f"{p}_real angle"], constants)
-        out.append(_AT_REST.format(**fields, rest=rest, nominal=nominal))
+        slope = derivative(step.at_rest[0], "motor_angle")
+        at_angle = constants | {"motor_angle": "angle"}
+        newton = c_body(p, [step.at_rest[0], slope], ["there", "slope"], at_angle)
+        nominal = c_body(p, [step.nominal_angle], ["angle"], constants)
+        out.append(_AT_REST.format(
+            **fields, rest=rest, nominal=indent(nominal, " " * 4), newton=indent(newton, " " * 8),
+            settled=_SETTLED,
+        ))  # fmt: skip
     return "".join([*out, "#endif\n"])
 
 
@@ -157,21 +174,31 @@ def c_body(
     return body + "".join(f"    {target} = r{i};\n" for i, target in enumerate(targets))
 
 
-def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
-    """The same step as plain data: constants, and assignments ``[name, operation, arguments]``."""
-    step = step_of(profile, terms)
-    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
-    names, inputs = {id(x): "" for x in roots}, inputs_of(profile)
-    own = {BEFORE * past + n: BEFORE * past + name
-           for n, (name, *_) in inputs.items() for past in (0, 1)}  # fmt: skip
+def assigned(
+    roots: Sequence[Expression], names: Mapping[str, str]
+) -> tuple[list[list[object]], list[str]]:
+    """Assignments ``[name, operation, arguments]`` that compute expressions, and the name or number
+    of each; ``names`` are of their symbols."""
+    values: dict[int, str] = {}
     assignments: list[list[object]] = []
     for x in ordered(roots):
         if not x.arguments:
-            names[id(x)] = own.get(x.name, x.name) or repr(x.value)
+            values[id(x)] = names.get(x.name, x.name) or repr(x.value)
             continue
-        names[id(x)] = f"t{len(assignments)}"
-        arguments = [names[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
-        assignments.append([names[id(x)], x.operation, *arguments])
+        values[id(x)] = f"t{len(assignments)}"
+        arguments = [values[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
+        assignments.append([values[id(x)], x.operation, *arguments])
+    return assignments, [values[id(x)] for x in roots]
+
+
+def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
+    """The same step as plain data: constants, and its assignments."""
+    step, inputs = step_of(profile, terms), inputs_of(profile)
+    own = {BEFORE * past + n: BEFORE * past + name
+           for n, (name, *_) in inputs.items() for past in (0, 1)}  # fmt: skip
+    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
+    assignments, values = assigned(roots, own)
+    after = values[len(step.outputs) :]
     return {
         "schema": 1,
         "profile": profile.name,
@@ -180,7 +207,8 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
         "constants": {c.name: {"value": c.value, "unit": c.unit, "source": c.source}
                       for c in step.constants},
         "assignments": assignments,
-        "outputs": {n: {"value": names[id(x)], "unit": OUTPUTS[n][0]}
-                    for n, x in step.outputs.items()},
-        "memory": {m.name: {"start": m.start, "next": names[id(m.after)]} for m in step.memories},
+        "outputs": {n: {"value": x, "unit": OUTPUTS[n][0]}
+                    for n, x in zip(step.outputs, values, strict=False)},
+        "memory": {m.name: {"start": m.start, "next": x}
+                   for m, x in zip(step.memories, after, strict=True)},
     }  # fmt: skip

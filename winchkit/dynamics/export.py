@@ -41,7 +41,7 @@ def export_model(
         The winch, the axis or the robot.
     to : {"c", "python", "mjcf", "json"}
         A header in C99 that needs ``math.h`` only, a Python module that needs ``math`` only, a
-        model of MuJoCo, or the formulas as JSON; of a robot C or MuJoCo.
+        model of MuJoCo, or the formulas as JSON; not Python of a robot.
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional

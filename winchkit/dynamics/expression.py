@@ -109,11 +109,11 @@ def _unary(name: str, slope: Callable[[Expression], Expression]) -> Operation:
     )
 
 
-def _comparison(text: str, evaluate: Callable[[float, float], object]) -> Operation:
+def _comparison(text: str, evaluate: Callable[[float, float], object], in_c: str = "") -> Operation:
     return Operation(
         lambda a, b: float(bool(evaluate(a, b))),
         f"(1.0 if {{}} {text} {{}} else 0.0)",
-        f"(real)({{}} {text} {{}})",
+        f"(real)({{}} {in_c or text} {{}})",
         _flat(2),
     )
 
@@ -199,8 +199,8 @@ OPERATIONS: Mapping[str, Operation] = {
     "greater_equal": _comparison(">=", operator.ge),
     "equal": _comparison("==", operator.eq),
     "not_equal": _comparison("!=", operator.ne),
-    "logical_and": _comparison("and", lambda a, b: a and b),
-    "logical_or": _comparison("or", lambda a, b: a or b),
+    "logical_and": _comparison("and", lambda a, b: a and b, "&&"),
+    "logical_or": _comparison("or", lambda a, b: a or b, "||"),
 }
 """Operations by the name of their numpy function."""
 
@@ -215,6 +215,11 @@ def apply(operation: str, *arguments: Expression) -> Expression:  # noqa: PLR091
             return second
         case "add" | "subtract" if _is(second, 0.0):
             return first
+        case "subtract" if first.operation == "add" and second in first.arguments:
+            # What was added, without the rounding of the sum.
+            return first.arguments[first.arguments[0] is second]
+        case "subtract" if second.operation == "subtract" and second.arguments[0] is first:
+            return second.arguments[1]
         case "multiply" if _is(first, 0.0) or _is(second, 0.0):
             return number(0)
         case "multiply" if _is(first, 1.0):

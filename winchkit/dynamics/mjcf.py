@@ -7,6 +7,7 @@ that the load follows the unstrained cable as in :func:`winchkit.forward`.
 
 from __future__ import annotations
 
+from cmath import phase, rect
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, pi, sin
@@ -23,10 +24,13 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.units import GRAVITY
 
 _STEP = 2.5e-4
-"""s: of the integration; the stiffest part is the equality of the cable, of twice this time."""
+"""s: of the integration. The stiffest parts have twice this time: the equality of the cable, and
+friction that holds a motor."""
+_STIFF = f"{2 * _STEP} 1"
+"""``solref`` of these; by MuJoCo's 20 ms a motor would slip on after it has stopped."""
 SMALL = 1e-9
 """kg and kg m²: of a body whose inertia is the armature of its joint; MuJoCo refuses zero."""
-_Attributes = Mapping[str, float]
+_Attributes = Mapping[str, complex]
 Law = Callable[[Mapping[str, float], float], _Attributes]
 """Attributes of the joint from the values of an effect (rotary names) and the gear ratio."""
 
@@ -45,11 +49,11 @@ COUNTERPARTS: Mapping[str, Law] = {
     "motor-viscous": _damping,
     "motor-coulomb": lambda v, i: {"frictionloss": v["torque"] * i},
     "spring-balancer": _spring,
-    "joint-gravity": lambda v, i: {"gravity": v["amplitude"] * i, "phase": v["phase"]},
-    "drum-unbalance": lambda v, i: {"gravity": v["amplitude"] * i, "phase": v["phase"]},
+    "joint-gravity": lambda v, i: {"gravity": rect(v["amplitude"] * i, v["phase"])},
+    "drum-unbalance": lambda v, i: {"gravity": rect(v["amplitude"] * i, v["phase"])},
 }
-"""Effects with the same law in MuJoCo; ``gravity`` and ``phase`` are those of a body that hangs on
-the joint."""
+"""Effects with the same law in MuJoCo; ``gravity`` is the torque of a body that hangs on the joint,
+as amplitude and phase of a complex number."""
 _ROTARY = {"mass": "inertia", "force": "torque"}
 
 
@@ -71,7 +75,7 @@ def joint_of(
 ) -> MujocoJoint:
     """The joint of a profile with its effects, but for those ``elsewhere``; raises UsageError for a
     profile without masses."""
-    found: dict[str, float] = {}
+    found: dict[str, complex] = {}
     missing: list[str] = []
     comments: list[str] = []
     ratio = profile.gearbox.ratio
@@ -89,16 +93,18 @@ def joint_of(
             continue
         for name, value in law(values, ratio).items():
             found[name] = found.get(name, 0.0) + value
-    inertia = found.pop("armature", 0.0)
+    gravity = found.pop("gravity", 0j)
+    attributes = {name: value.real for name, value in found.items()}
+    inertia = attributes.get("armature", 0.0)
     if inertia <= 0.0:
         raise UsageError(
             f"profile '{profile.name}' has no mass that MuJoCo could move: add the effect "
             "rotor-inertia"
         )
-    gravity, phase = found.pop("gravity", 0.0), found.pop("phase", 0.0)
-    body, inertia = _pendulum(gravity, phase, inertia)
-    attributes = {"armature": inertia, **found}
+    body, attributes["armature"] = _pendulum(gravity, inertia)
     joint = " ".join(f'{name}="{value:.17g}"' for name, value in attributes.items() if value)
+    if attributes.get("frictionloss"):
+        joint += f' solreffriction="{_STIFF}"'
     return MujocoJoint(joint, body, ratio * profile.gearbox.direction, missing, comments)
 
 
@@ -154,16 +160,15 @@ def _std(fitted: object) -> object:
     return dict(fitted).get("std") if isinstance(fitted, Mapping) else None
 
 
-def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]:
-    """Inertial element, and left armature, of a joint whose weight has the torque ``gravity`` sin(φ
-    + phase), N m. Any mass m at a distance l with m g l of this torque is the same; half of the
+def _pendulum(gravity: complex, inertia: float) -> tuple[str, float]:
+    """Inertial element, and left armature, of a joint whose weight has the torque ``|gravity| sin(φ
+    + phase)``, N m. Any mass m at a distance l with m g l of this torque is the same; half of the
     inertia is taken for it."""
     small = f'diaginertia="{SMALL} {SMALL} {SMALL}"'
     if gravity == 0.0:
         return f'<inertial pos="0 0 0" mass="{SMALL}" {small}/>', inertia
     length = inertia * GRAVITY / (2 * abs(gravity))
-    mass = abs(gravity) / (GRAVITY * length)
-    turn = phase if gravity > 0 else phase + pi
+    mass, turn = abs(gravity) / (GRAVITY * length), phase(gravity)
     place = f"{-length * sin(turn):.17g} 0 {-length * cos(turn):.17g}"
     return f'<inertial pos="{place}" mass="{mass:.17g}" {small}/>', inertia - mass * length**2
 
@@ -201,5 +206,5 @@ def wound_equality(slide: str, drum: str, arm: float, growth: float) -> str:
     polynomial = f"0 {arm:.17g} {growth / (4 * pi):.17g} 0 0"
     return (
         f'    <joint joint1="{slide}" joint2="{drum}" polycoef="{polynomial}" '
-        f'solref="{2 * _STEP} 1" solimp="0.999 0.9999 0.001"/>\n'
+        f'solref="{_STIFF}" solimp="0.999 0.9999 0.001"/>\n'
     )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from winchkit.dynamics.balance import needs_a_step
+from winchkit.dynamics.differences import with_exact_differences
 from winchkit.dynamics.expression import Expression, symbol
 from winchkit.dynamics.tracing import expression, traced
 from winchkit.effects.effect import Values
@@ -148,10 +149,15 @@ def step_of(profile: WinchProfile, terms: Sequence[Term], prefix: str = "winch")
     at = resting.moments(none, one["motor_angle"], none, one["load"], traced([20.0]))
     length, arm = resting.lengths_and_arms(at)
     nominal = expression(line.nominal_motor_angle(traced([symbol("length")])))
-    shown = {name: outputs[name] for name in outputs_of(profile)}
+    shown, memories = outputs_of(profile), recorder.memories.values()
+    roots = [*(outputs[name] for name in shown), *(m.after for m in memories)]
+    exact = with_exact_differences(roots, {name: BEFORE + name for name in INPUTS})
     return LineSample(
-        shown, tuple(recorder.memories.values()), tuple(constants.values()),
-        (expression(length), expression(arm)), nominal,
+        dict(zip(shown, exact, strict=False)),
+        tuple(
+            replace(m, after=new) for m, new in zip(memories, exact[len(shown) :], strict=True)
+        ),
+        tuple(constants.values()), (expression(length), expression(arm)), nominal,
     )  # fmt: skip
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.fft import dct
 from scipy.stats import kstest
 
-from diagnosis_runs import Array, Ride, length_problem, term
+from diagnosis_runs import GROOVED, NOISE, Array, Ride, length_problem, made, term
+from winchkit import diagnose
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
@@ -94,6 +96,29 @@ def measured_anew(regression: TimeSeriesRegression, residuals: Sequence[Array]) 
             for segment, residual in zip(regression.segments, residuals, strict=True)
         ]
     )
+
+
+def test_an_output_that_no_repeats_have_gets_its_noise_from_the_other_effects() -> None:
+    """Repeats without a load predict no tension; a later run under a known weight does."""
+    hidden, ride = [term("motor-coulomb", torque=0.2)], Ride(samples=2000)
+    repeats = [replace(made(seed, terms=hidden, ride=ride), metadata={}) for seed in range(2)]
+    weighed = made(5, terms=hidden, load_mass=25.0, ride=replace(ride, period=5.0))
+    found = diagnose([*repeats, weighed], GROOVED).diagnosis
+    assert [step.effects for step in found.steps] == [("motor-coulomb",)]
+    assert found.outputs["tension"].noise_rms == pytest.approx(NOISE["tension"], rel=0.05)
+    sources = [found.outputs[name].noise_source for name in ("tension", "motor_torque")]
+    assert sources == ["saturated fit", "repeats"]
+
+
+def test_the_lowest_frequencies_of_a_long_run_get_their_noise_from_the_other_effects() -> None:
+    """They are below those of the short repeats beside it, which have no noise there;
+    with less than a degree of freedom no effect would be significant."""
+    ride = Ride(samples=400, stroke=60.0)
+    repeats = [made(seed, ride=ride) for seed in range(2)]
+    longer = made(5, load_mass=20.0, ride=replace(ride, samples=4000, period=40.0))
+    noise = diagnose([*repeats, longer], GROOVED).result.noise
+    assert noise.dof.min() > 1.9
+    assert noise.rms["cable_length"] == pytest.approx(NOISE["cable_length"], rel=0.1)
 
 
 @pytest.mark.slow

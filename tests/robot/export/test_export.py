@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from dataclasses import replace
@@ -13,8 +14,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+import export_tick
 from winchkit import export_model, find
 from winchkit.dynamics.c_code import identifier
+from winchkit.dynamics.expression import OPERATIONS
 from winchkit.errors import UsageError
 from winchkit.model.rotation import quaternion_of, rotation_by
 from winchkit.robot import ForceLimits, Pose
@@ -82,7 +85,8 @@ def random_poses(robot: Robot, count: int, seed: int) -> Pose:
 def by_c(
     folder: Path, profile: RobotProfile, pose: Pose, real: str = "double"
 ) -> list[NDArray[np.float64]]:
-    """Length, structure matrix, wrench, forces, angles and whether they are within the limits."""
+    """Length, structure matrix, wrench, forces, lengths by the model at the motor angles, and
+    whether the forces are within the limits."""
     count, name = len(profile.line), identifier(profile.name)
     (folder / "robot.h").write_text(export_model(profile, "c").text)
     main = MAIN.replace("NAME", name).replace("LINES", str(count))
@@ -97,6 +101,8 @@ def by_c(
     widths = np.cumsum([count, 6 * count, 6, count, count])
     parts = np.split(rows, widths, axis=1)
     parts[1] = parts[1].reshape(-1, count, 6).transpose(0, 2, 1)
+    # Motor angles are an inverse: they are exact where the model has the asked lengths at them.
+    parts[4] = robot_with_effects(profile).lengths_at(parts[4], parts[3])
     return parts
 
 
@@ -107,8 +113,8 @@ def by_python(profile: RobotProfile, pose: Pose) -> list[NDArray[np.float64]]:
     found = [closed_form(a, w, limits) for a, w in zip(structure, wrench, strict=True)]
     force = np.array([one.value for one in found])
     within = np.array([[float(one.feasible)] for one in found])
-    angles = robot.motor_angles(pose, tension=force)
-    return [robot.lengths(pose), structure, wrench, force, angles, within]
+    lengths = robot.lengths(pose)
+    return [lengths, structure, wrench, force, lengths, within]
 
 
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
@@ -126,6 +132,13 @@ def test_the_compiled_header_is_the_robot(tmp_path: Path, name: str, count: int)
     wanted = by_python(profile, some)[:-1]
     for own, other in zip(by_c(tmp_path, profile, some, "float"), wanted, strict=False):
         assert np.max(np.abs(own - other)) <= 1e-5 * np.max(np.abs(other))
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_the_benchmark_times_every_part_of_a_tick() -> None:
+    found = export_tick.measured("cabtive", "float")
+    assert set(found) == {*export_tick.PARTS, export_tick.WHOLE, export_tick.STEPS}
+    assert all(0 < seconds < 1e-3 for seconds in found.values())
 
 
 def movable(name: str) -> RobotProfile:
@@ -211,14 +224,24 @@ def test_a_robot_without_masses_or_stiffness_is_refused() -> None:
         export_model(replace(movable("cabtive"), effect=()), "mjcf")
 
 
-@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
-def test_effects_move_the_exported_angles(tmp_path: Path) -> None:
-    """Without its effects the header has other motor angles: they are in it."""
+def test_the_json_has_the_formulas_of_a_cable_and_of_its_winch() -> None:
     profile = robot_profile("cabtive")
-    pose = random_poses(robot_with_effects(profile), 20, 2)
-    bare = read_robot(find("profiles", "cabtive"))
-    with_effects, without = (by_c(tmp_path, one, pose)[4] for one in (profile, bare))
-    assert np.min(np.max(np.abs(with_effects - without), axis=1)) > 1e-5
+    robot = robot_with_effects(profile)
+    pose, found = random_poses(robot, 3, 8), export_model(profile, "json")
+    data = json.loads(found.text)
+    assert [one.split(":")[0] for one in found.missing] == ["force distribution"]
+    assert data["lines"]["1"]["winch"]["profile"] == "cabtive-1"
+    for i, (position, rotation) in enumerate(zip(pose.position, pose.rotation, strict=True)):
+        for k, line in enumerate(data["lines"].values()):
+            given = {"position": position, "rotation": rotation.ravel(), "at": line["at"]}
+            known = {f"{n}[{j}]": float(x) for n, row in given.items() for j, x in enumerate(row)}
+            for name, operation, *arguments in data["assignments"]:
+                values = [known[a] if isinstance(a, str) else a for a in arguments]
+                known[name] = OPERATIONS[operation].evaluate(*values)
+            outputs = data["outputs"]
+            assert known[outputs["length"]["value"]] == pytest.approx(robot.lengths(pose)[i, k])
+            column = [known[one] for one in outputs["column"]["value"]]
+            assert column == pytest.approx(robot.structure(pose)[i, :, k], abs=1e-12)
 
 
 def test_too_few_cables_have_no_force_distribution() -> None:
@@ -229,7 +252,7 @@ def test_too_few_cables_have_no_force_distribution() -> None:
 
 def test_forms_that_a_robot_has_not_are_refused_by_name() -> None:
     profile = read_robot(find("profiles", "cabtive"))
-    with pytest.raises(UsageError, match="is written as c or mjcf, not as 'python'"):
+    with pytest.raises(UsageError, match="is written as c, mjcf or json, not as 'python'"):
         export_model(profile, "python")
     with pytest.raises(UsageError, match="the mass on its cables is that of"):
         export_model(profile, "c", load_mass=3.0)

@@ -35,7 +35,8 @@ _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
 _RUN_MINUTES, _LOADING_MINUTES, _WARMING_MINUTES = 10.0, 1 / 3, 20.0
 """Time of an operator to prepare, watch and keep a run, to change a load, to warm the machine,
-minutes; rule of thumb."""
+minutes; rule of thumb: 3 to 30 minutes for a run give the same first programme (32 of 32 winches of
+``benchmarks/plan_runs.py``), since moving takes a minute or two."""
 _FULL = 18.33
 """λ of 90 % power against a limit of 9: (3 + Φ⁻¹(0.9))²; theory."""
 _SOME = 0.1

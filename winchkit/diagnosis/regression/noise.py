@@ -37,6 +37,8 @@ _LEAST_DOF = 4.0
 wide band."""
 _REWEIGHTED = 3
 """Reweighting iterations; screened."""
+_UPPER = 0.5
+"""Share of an output's bands whose noise is a lower bound of that below them; rule of thumb."""
 _ROWS_EACH = 4
 """Rows per direction that is projected out of a saturated model; screened."""
 
@@ -57,6 +59,23 @@ class BandNoise:
     def inverse_sigma(self, regression: Regression) -> Array:
         """1/σ of every row, shape (n_rows,)."""
         return np.asarray(1 / np.sqrt(self.power[regression.band_of_row]))
+
+    def with_bands(
+        self, theirs: NDArray[np.bool_], other: BandNoise, regression: Regression
+    ) -> BandNoise:
+        """The same with some bands, (n_bands,), from another estimate, if it is not smaller.
+
+        Both may be too small, by what the neighbours or the candidates explain; the noise of
+        instruments does not fall towards low frequencies: it is at least that of the upper bands.
+        """
+        power = np.where(theirs, np.maximum(self.power, other.power), self.power)
+        dof = np.where(theirs, other.dof, self.dof)
+        for first, edges in _edges(regression).values():
+            own = np.arange(first, first + len(edges) - 1)
+            upper = own[-max(1, round(_UPPER * len(own))) :]
+            white = dof[upper] @ power[upper] / np.sum(dof[upper])
+            power[own] = np.where(theirs[own], np.maximum(power[own], white), power[own])
+        return replace(self, power=power, dof=dof, rms=_rms(regression, power))
 
     def uncertainty(self, regression: Regression) -> dict[str, float]:
         """Relative uncertainty (two standard deviations) of the mean square per output; coloured

@@ -43,6 +43,9 @@ _MOST_PEAKS = 12
 """Orders that enter the grids in one scan of all effects with an order; computing cost; further
 ones are found by the harmonic series and by later scans."""
 
+_LEAST_DOF = 2.0
+"""Degrees of freedom from which the noise of a band is that of repeats: F has no mean below."""
+
 
 class TimeSeriesSelection(SelectionEngine):
     """Selection among hypotheses on a winch's runs, from the profile's own effects on."""
@@ -62,12 +65,18 @@ class TimeSeriesSelection(SelectionEngine):
         super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
-        """Noise from the contrasts of repeats; without repeats from the saturated model."""
-        if self.regression.replicates:
-            offsets = jacobian[:, : self.regression.n_run_offsets]
-            own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
-            return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
-        return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        """Noise from the contrasts of repeats; from the saturated model without repeats, and in the
+        bands without repeats: of an output that none has, or below their lowest frequency."""
+        if not self.regression.replicates:
+            return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        offsets = jacobian[:, : self.regression.n_run_offsets]
+        own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
+        noise = noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
+        few = noise.dof < _LEAST_DOF
+        if not few.any():
+            return noise
+        beside = noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+        return noise.with_bands(few, beside, self.regression)
 
     @property
     def profile(self) -> WinchProfile:

@@ -26,7 +26,7 @@ from winchkit.diagnosis.regression.cross_validation import (
     held_out_samples,
 )
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.regression.noise import BandNoise, replicate_rms
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
@@ -214,6 +214,8 @@ def output_fits(
     noise_leakage = leakage.noise(final[0].hypothesis)
     known = noise.from_repeats
     p_values = engine.p_values(*final) if known else {}
+    source = dict.fromkeys(regression.outputs, "saturated fit" if known else "white noise")
+    source |= dict.fromkeys(replicate_rms(regression, final[0].residual), "repeats")
     size = noise.rms if known else white_noise(regression, final[0].residual)
     if any(held_after[output] > AT_NOISE * size[output] for output in size):
         # What coarse samples of a fast motion add to the error is known, and no effect.
@@ -231,7 +233,7 @@ def output_fits(
             heldout_rms_before=_with(held_before[output], leakage_before.get(output)),
             heldout_rms_after=_with(held_after[output], leakage_after.get(output)),
             noise_rms=_with(size[output], noise_leakage.get(output)),
-            noise_source="repeats" if known else "white noise",
+            noise_source=source[output],
             noise_upper=None
             if known
             else _with(max(after[output], size[output]), leakage_after.get(output)),

@@ -100,6 +100,18 @@ static inline void {p}_motor_angles(const {p}_real *length, const {p}_real *forc
 """
 _FORCES = """\
 
+static inline {p}_real {p}_dot(const {p}_real *a, const {p}_real *b)
+{{
+    {p}_real even = 0, odd = 0; /* Two sums: a processor adds them at the same time. */
+    for (int i = 0; i + 1 < {P}_LINES; i += 2) {{
+        even += a[i] * b[i];
+        odd += a[i + 1] * b[i + 1];
+    }}
+    if ({P}_LINES % 2)
+        even += a[{P}_LINES - 1] * b[{P}_LINES - 1];
+    return even + odd;
+}}
+
 /* Cable forces, N, that balance a wrench and are nearest to the middle of their limits (closed
    form). Returns 1 where they are within the limits, else 0; NAN in a singular pose. */
 static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
@@ -110,29 +122,22 @@ static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
     for (int i = 0; i < {P}_LINES; ++i)
         force[i] = (low[i] + high[i]) / 2;
     for (int j = 0; j < {P}_FREE; ++j) {{
-        {p}_real whole = 0, left;
-        missing[j] = wrench[{p}_free[j]];
-        for (int i = 0; i < {P}_LINES; ++i) {{
+        {p}_real whole, left, inverse;
+        for (int i = 0; i < {P}_LINES; ++i)
             q[j][i] = structure[6 * i + {p}_free[j]];
-            missing[j] += q[j][i] * force[i];
-            whole += q[j][i] * q[j][i];
-        }}
+        missing[j] = wrench[{p}_free[j]] + {p}_dot(q[j], force);
+        whole = left = {p}_dot(q[j], q[j]);
         for (int k = 0; k < j; ++k)
             r[j][k] = 0;
-        left = whole;
-        for (int pass = 0; pass < 2; ++pass) {{
+        for (int pass = 0; pass < 2 && j; ++pass) {{
             const {p}_real before = left;
-            for (int k = 0; k < j; ++k) {{
-                {p}_real along = 0;
+            {p}_real along[{P}_FREE];
+            for (int k = 0; k < j; ++k)
+                r[j][k] += along[k] = {p}_dot(q[k], q[j]);
+            for (int k = 0; k < j; ++k)
                 for (int i = 0; i < {P}_LINES; ++i)
-                    along += q[k][i] * q[j][i];
-                for (int i = 0; i < {P}_LINES; ++i)
-                    q[j][i] -= along * q[k][i];
-                r[j][k] += along;
-            }}
-            left = 0;
-            for (int i = 0; i < {P}_LINES; ++i)
-                left += q[j][i] * q[j][i];
+                    q[j][i] -= along[k] * q[k][i];
+            left = {p}_dot(q[j], q[j]);
             if (4 * left > before) /* Little was taken away: little of it was rounding. */
                 break;
         }}
@@ -142,8 +147,9 @@ static inline int {p}_forces(const {p}_real *structure, const {p}_real *wrench,
             return 0;
         }}
         r[j][j] = {P}_F(sqrt)(left);
+        inverse = 1 / r[j][j];
         for (int i = 0; i < {P}_LINES; ++i)
-            q[j][i] /= r[j][j];
+            q[j][i] *= inverse;
     }}
     for (int j = 0; j < {P}_FREE; ++j) {{
         for (int k = 0; k < j; ++k)
@@ -167,9 +173,6 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
     :func:`~winchkit.dynamics.step.step_of`."""
     p, place = identifier(robot.profile.name), robot.geometry
     rows = np.flatnonzero(place.free).tolist()
-    numbers = np.hstack(
-        [place.exit_point, place.anchor_point, place.swivel_axis, place.swivel_radius[:, None]]
-    )
     mass, centre = robot.platform.mass, robot.platform.center_of_mass
     x, y, z = (c_literal(float(one), p) for one in centre)
     angles = "".join(
@@ -186,7 +189,7 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
         "rows": ", ".join(map(str, rows)),
         "geometry": "".join(
             f"    {{{', '.join(map(repr, row))}}}, /* line {name} */\n"
-            for row, name in zip(numbers.tolist(), robot.names, strict=True)
+            for row, name in zip(line_numbers(place), robot.names, strict=True)
         ),
         "cable": _cable(p, place.free),
         "weight": c_literal(-mass * GRAVITY, p),
@@ -208,22 +211,36 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
     return text + "\n#endif\n", missing
 
 
-def _cable(p: str, free: Array) -> str:
-    """Length and column of one cable, recorded on symbols."""
+def cable_formulas(free: Array) -> tuple[list[Expression], dict[str, str]]:
+    """Length and column of the structure matrix of one cable, recorded on symbols, and the place of
+    each symbol: numbers of the line ``at[…]``, of the pose ``position[…]`` and ``rotation[…]``."""
     names: dict[str, str] = {}
 
     def symbols(of: str, count: int) -> list[Expression]:
         names.update((f"{of}{k}", f"{of}[{k}]") for k in range(count))
         return [symbol(f"{of}{k}") for k in range(count)]
 
-    at = symbols("at", 10)
-    position, turned = symbols("pose->position", 3), symbols("pose->rotation", 9)
+    at, position, turned = symbols("at", 10), symbols("position", 3), symbols("rotation", 9)
     geometry = Geometry(
         traced([at[:3]]), traced([at[3:6]]), traced([at[9]]), traced([at[6:9]]), free
     )
     rotation: Any = traced(turned).reshape(1, 3, 3)
     length, by = linearised(geometry, traced([position]), rotation)
     parts = [length, *(-part[0, 0, k] for part in (by.position, by.rotation) for k in range(3))]
-    roots = [expression(one) for one in parts]
-    targets = ["*length", *(f"column[{j}]" for j in range(6))]
-    return c_body(p, roots, targets, names)
+    return [expression(one) for one in parts], names
+
+
+def _cable(p: str, free: Array) -> str:
+    """The formulas of one cable in C."""
+    roots, names = cable_formulas(free)
+    of_pose = {
+        n: place if place.startswith("at") else f"pose->{place}" for n, place in names.items()
+    }
+    return c_body(p, roots, ["*length", *(f"column[{j}]" for j in range(6))], of_pose)
+
+
+def line_numbers(place: Geometry) -> list[list[float]]:
+    """Numbers of each line: exit point, anchor point, swivel axis, swivel radius."""
+    parts = [place.exit_point, place.anchor_point, place.swivel_axis, place.swivel_radius[:, None]]
+    numbers: list[list[float]] = np.hstack(parts).tolist()
+    return numbers

@@ -219,7 +219,8 @@ def sensitivities(geometry: Geometry, position: Array, rotation: Array) -> Sensi
 def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Array, Sensitivities]:
     """:func:`lengths` and :func:`sensitivities` together."""
     t = _tangent(geometry, position, rotation)
-    scale = np.hypot(t.sine, t.cosine)
+    # D²: sine and cosine are those of the product of two numbers of modulus D.
+    scale = t.free * t.free + geometry.swivel_radius * geometry.swivel_radius
     scale = np.where(scale > 0, scale, np.nan)
     sine, cosine = t.sine / scale, t.cosine / scale
     unit = np.stack([sine * h for h in _unit(t)], axis=-1)
