@@ -53,11 +53,13 @@ def effect_lines(needed: StaticDiagnosis) -> list[str]:
         f"  cannot be distinguished from: {', '.join(names) or 'none'}"
         for names in needed.alternatives
     ]
+    sizes = ", ".join(f"{name} {value:.2g} N" for name, value in needed.detectable)
+    found = [f"  smallest error found with 90 % power: {sizes}"] if sizes else []
     if not needed.effects:
-        return [f"effects of the cell: none is needed ({error})", *alike]
+        return [f"effects of the cell: none is needed ({error})", *alike, *found]
     lines = [f"effects of the cell (least BIC; {error}, {needed.after:.3g} N beside them):"]
     lines += [f"  {' '.join(row)}" for row in _effect_rows(needed)]
-    lines += alike
+    lines += [*alike, *found]
     if not math.isnan(needed.p_value):
         lines.append(
             f"  lack of fit: p = {needed.p_value:.2g}; repeatability {needed.repeatability:.3g} N"
@@ -150,8 +152,15 @@ def _effects(needed: StaticDiagnosis | None) -> Markup:
         return Markup("")
     if not needed.effects:
         return element("p", *effect_lines(needed))
-    caption = effect_lines(needed)[0].removesuffix(":")
-    return table(caption, ("effect", "parameter", "value"), _effect_rows(needed), words=2)
+    caption, *lines = effect_lines(needed)
+    others = lines[len(needed.effects) :]
+    head = ("effect", "parameter", "value")
+    return join(
+        [
+            table(caption.removesuffix(":"), head, _effect_rows(needed), words=2),
+            *(element("p", line) for line in others),
+        ]
+    )
 
 
 def _about(calibration: CellCalibration) -> Markup:
