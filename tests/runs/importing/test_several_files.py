@@ -55,6 +55,21 @@ def test_a_column_of_one_of_several_files_without_names(tmp_path: Path) -> None:
     assert "there is no file 'pos2.t'" in output
 
 
+@pytest.mark.parametrize("join", [(), ("--join",)])
+def test_a_recording_given_twice_is_no_repeat(tmp_path: Path, join: tuple[str, ...]) -> None:
+    head = "time [s],angle [deg],torque [N m]"
+    one = write(tmp_path / "one.csv", head, TIME, ANGLE, np.cos(TIME))
+    copy = write(tmp_path / "copy.csv", head, TIME, ANGLE, np.cos(TIME))
+    repeat = write(tmp_path / "repeat.csv", head, TIME, ANGLE + 0.01, np.cos(TIME))
+    for other in (one, copy):
+        code, output = command(one, other, "-o", tmp_path / "runs", *join)
+        assert code == 3
+        assert f"has the same numbers as {one}, and is no repeat of it: give it once" in output
+        assert not (tmp_path / "runs").exists()
+    code, output = command(one, repeat, "-o", tmp_path / "runs", *join)
+    assert code == 0, output
+
+
 def imported(path: Path, *given: str) -> Run:
     guess = guess_columns(read_table(path), Answers(tuple(map(read_column, given))))
     assert not guess.questions, guess.questions
@@ -136,7 +151,8 @@ def test_sixteen_files_of_one_kind_are_one_table(is_uneven: bool, tmp_path: Path
     assert code == 0
     assert output.count("motor_angle  ") == 1
     assert len(output.splitlines()) <= 40
-    _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, 5 * ANGLE, TIME) for p in paths])
+    turned = [(path, 5 * ANGLE + n) for n, path in enumerate(paths)]
+    _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, q, TIME) for p, q in turned])
     assert shown.count("? 'q'") == 1
 
 
