@@ -129,8 +129,8 @@ def test_the_unit_of_a_row_counts_before_that_of_a_name(tmp_path: Path) -> None:
 
 STRANGERS = {
     # Dynamometers of a planetary gearbox, of motors, and of a joint.
-    "# Test started\n# limit = 25.0 A\ntime [s],velocity setpoint [Hz],velocity measured [Hz],motor "
-    "torque measured [Nm],motor torque setpoint [Nm],load cell weight [g],brake torque [Nm]\n": {
+    "# Test started\n# limit = 25.0 A\ntime [s],velocity setpoint [Hz],velocity measured [Hz],"
+    "motor torque measured [Nm],load cell weight [g],brake torque [Nm]\n": {
         "motor_velocity": "velocity measured",
         "motor_torque": "motor torque measured",
         "tension": "load cell weight",

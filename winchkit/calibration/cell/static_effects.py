@@ -1,6 +1,6 @@
 """Effects of a load cell that points at rest determine: zero, span, curvature, hysteresis.
 
-The difference of reading and load is a linear model of up to seven columns; all subsets are fitted
+The difference of reading and load is a linear model of up to eight columns; all subsets are fitted
 by least squares, and that of least BIC is kept, of those that are better than each of their parts
 by an F test. The levels of the tests of all models with one part add up to 5 %: a cell with no
 effect, or with those of the part only, has others in at most 5 % of calibrations (closed testing
@@ -9,10 +9,10 @@ the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and ``cell-hys
 the values go into a profile, and three that depend on the order of the loads: a zero return (all
 readings of a series after its largest load), a zero shift (all readings after the first largest
 load, or from that reading on) and a loop that closes at both ends (4h x (1 − x) of the reading on
-the way down, x the share of the largest load: the parabolas of Rayleigh's law). Readings in a unit
-of their own (counts, mV/V) have their zero and span by definition; the other terms are then in
-newtons of their own span. Series that repeat each other give the pure error, with which the lack
-of fit of the kept model is tested.
+the way down, x the share of the largest load: the parabolas of Rayleigh's law); of readings with
+times, a creep. Readings in a unit of their own (counts, mV/V) have their zero and span by
+definition; the other terms are then in newtons of their own span. Series that repeat each other
+give the pure error, with which the lack of fit of the kept model is tested.
 
 References
 ----------
@@ -46,6 +46,7 @@ _TERMS = (
     ("zero-return", "shift", "N"),
     ("zero-shift", "shift", "N"),
     ("hysteresis-loop", "height", "N"),
+    ("creep", "share", "1"),
 )
 _RETURNING = (3, 4, 6)
 """Terms that need loads in both directions."""
@@ -100,7 +101,9 @@ class StaticDiagnosis:
     the point where it is largest."""
 
 
-def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> StaticDiagnosis:
+def static_effects(
+    points: Sequence[CalibrationPoint], unit: str = "N", creep_shape: Sequence[float] = ()
+) -> StaticDiagnosis:
     """Effects of a cell that explain the differences of its readings and the loads.
 
     Parameters
@@ -109,6 +112,8 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
         Known loads with readings.
     unit : str, optional
         Unit of the readings; in another one than N their line gives the force.
+    creep_shape : sequence of float, optional
+        Of a file of points with times: then a creep is an effect too.
 
     Returns
     -------
@@ -131,7 +136,8 @@ def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> Stati
     share = load / max(float(np.max(np.abs(load))), 1e-300)
     moved = _moved(load, error, after)
     closed = 4 * after * share * (1 - np.abs(share))
-    columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved, closed])
+    crept = np.array(creep_shape if len(creep_shape) else np.zeros_like(load))
+    columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved, closed, crept])
     offered = [k for k in range(len(_TERMS)) if k not in (*_RETURNING, _SHIFT) or len(set(up)) > 1]
     if len({point.series for point in points}) == 1 and _SHIFT in offered:
         offered.remove(_SHIFT)
@@ -214,7 +220,12 @@ class _Tests:
     def detectable(
         self, kept: frozenset[int], offered: Sequence[int]
     ) -> Iterator[tuple[str, float]]:
-        """Terms beyond a line that were not kept, with the largest error found with 90 % power."""
+        """Terms beyond a line that were not kept, with the largest error found with 90 % power.
+
+        Of readings without noise there are none.
+        """
+        if self._square(kept.union(_LINE)) <= self.floor:
+            return
         for k in sorted(set(offered) - kept):
             terms = sorted({*kept, *_LINE, k})
             free = len(self.error) - len(terms)

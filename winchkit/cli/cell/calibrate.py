@@ -27,7 +27,7 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import BenchCells
-    from winchkit.calibration.cell.fit import CellFit
+    from winchkit.calibration.cell.fit import CellFit, FigureOfMerit
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
 _AT_REST = 4.0
@@ -121,16 +121,17 @@ def command(
     if output is not None:
         check_output(output, (".toml",))
     found = _found(cell, bench, points, serial, guided)
-    fit, needed = fit_cell(found.points, order), static_effects(found.points, found.unit)
+    fit = fit_cell(found.points, order)
+    needed = static_effects(found.points, found.unit, found.creep_shape)
     beside = Path(bench or points or "").parent
     target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
-    for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
+    for line in [*report_lines(fit, found.points, found.unit, found.creep), *effect_lines(needed)]:
         click.echo(line, err=is_json())
     if html is not None:
         from winchkit.report.pages.cell_calibration import report_page
 
-        write_page(html, report_page(calibration, fit, needed))
+        write_page(html, report_page(calibration, fit, needed, found.creep))
     if figures is not None:
         from winchkit.report.pages.cell_calibration import cell_figures
 
@@ -142,7 +143,7 @@ def command(
     if is_json():
         echo_json(
             {"schema": 1, "file": str(target), "fit": fit, "points": found.points}
-            | {"diagnosis": needed}
+            | {"diagnosis": needed, "creep": found.creep}
         )
     suggest_next("check", str(target))
 
@@ -157,6 +158,9 @@ class _Measured:
     points: tuple[CalibrationPoint, ...]
     unit: str = "N"
     """Of the readings."""
+    creep_shape: tuple[float, ...] = ()
+    creep: FigureOfMerit | None = None
+    """Of a file of points with times."""
 
 
 def _found(
@@ -229,7 +233,7 @@ def _from_file(name: str, bench: str, points: str) -> _Measured:
     winch, _, role = name.rpartition(".")
     device = device_of(spec, refs_of(spec)[winch, role]).name
     found = read_points(points)
-    return _Measured(name, device, "", found.points, found.unit)
+    return _Measured(name, device, "", found.points, found.unit, found.creep_shape, found.creep)
 
 
 def _from_file_alone(points: str) -> _Measured:
@@ -237,7 +241,8 @@ def _from_file_alone(points: str) -> _Measured:
     from winchkit.calibration.cell.files import read_points
 
     found = read_points(points)
-    return _Measured(f"{Path(points).stem}-calibration", "", "", found.points, found.unit)
+    name = f"{Path(points).stem}-calibration"
+    return _Measured(name, "", "", found.points, found.unit, found.creep_shape, found.creep)
 
 
 def _measure(
