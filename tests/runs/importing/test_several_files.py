@@ -128,6 +128,24 @@ def test_a_single_row_out_of_order_is_left_out(shift: float, tmp_path: Path) -> 
     assert any("1 of 200 rows (line 79)" in note for note in run.notes)
 
 
+@pytest.mark.parametrize("is_reversed", [False, True])
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_few_rows_without_a_time_are_left_out(
+    count: int, is_reversed: bool, tmp_path: Path
+) -> None:
+    time = TIME.copy()
+    time[[77, 120, 140][:count]] = np.nan
+    step = -1 if is_reversed else 1
+    path = write(tmp_path / "a.csv", "time [s],q [deg]", time[::step], ANGLE[::step])
+    if count > 2:
+        with pytest.raises(RunError, match="time is missing here"):
+            imported(path)
+        return
+    run = imported(path)
+    assert run["motor_angle"] == pytest.approx(np.radians(np.delete(ANGLE, [77, 120])), abs=1e-6)
+    assert any("2 of 200 rows" in note and "have no time" in note for note in run.notes)
+
+
 @pytest.mark.parametrize("back", [1.5, 3.0, 60.0])
 def test_a_clock_that_is_set_back_is_refused(back: float, tmp_path: Path) -> None:
     time = np.where(np.arange(200) < 100, TIME, TIME - back / 50)
