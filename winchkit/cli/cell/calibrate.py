@@ -64,6 +64,12 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     type=TABLE,
     help="Fit these points instead of measuring.",
 )
+@click.option(
+    "--weight-class",
+    "weight_class",
+    type=click.Choice(["E2", "F1", "F2", "M1", "M2", "M3"]),
+    help="Accuracy class of the weights (OIML R 111), whose tolerance is added to the uncertainty.",
+)
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
 @duration_option("Averaging time per weight.", default="3 s")
 @quantity_option("--settle", of="time", default="2 s", help="Waiting time after a weight is hung.")
@@ -91,6 +97,7 @@ def command(
     cell: str | None,
     bench: str | None,
     points: str | None,
+    weight_class: str | None,
     order: Literal["linear", "quadratic"],
     serial: str | None,
     temperature: str | None,
@@ -108,7 +115,7 @@ def command(
     Points from a file need neither CELL nor a bench.
     """
     from winchkit.calibration.cell.files import calibration_toml, write_text
-    from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.calibration.cell.fit import WEIGHT_CLASSES, fit_cell
     from winchkit.calibration.cell.static_effects import static_effects
     from winchkit.cli.core.quantities import optional
     from winchkit.report.pages.cell_calibration import effect_lines, report_lines
@@ -121,7 +128,8 @@ def command(
     if output is not None:
         check_output(output, (".toml",))
     found = _found(cell, bench, points, serial, guided)
-    fit = fit_cell(found.points, order)
+    tolerance = WEIGHT_CLASSES[weight_class] if weight_class else 0.0
+    fit = fit_cell(found.points, order, tolerance)
     needed = static_effects(found.points, found.unit, found.creep_shape)
     beside = Path(bench or points or "").parent
     target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
