@@ -201,9 +201,8 @@ def test_motions_and_spikes_are_no_jumps(tmp_path: Path) -> None:
     assert "jumps by" not in output
 
 
-@pytest.mark.parametrize("decimals", [0, 1])
 @pytest.mark.parametrize("kind", ["two's complement", "sign and magnitude"])
-@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize(("bits", "decimals"), [(8, 0), (16, 0), (16, 1), (32, 0), (32, 1)])
 def test_the_sign_of_a_coarse_signal_is_asked_and_restored(
     bits: int, kind: str, decimals: int, tmp_path: Path
 ) -> None:
@@ -233,6 +232,12 @@ def test_per_cent_that_are_all_negative_have_lost_their_sign() -> None:
     values = 65531.0 + np.arange(3)
     assert lost_sign(values.astype(np.float64), is_small=True) is not None
     assert lost_sign(values.astype(np.float64)) is None
+
+
+def test_two_levels_of_a_force_are_no_signs_of_a_byte() -> None:
+    values = np.array([2.0, 3.0, 252.0, 253.0])
+    assert lost_sign(values, is_small=True) is not None
+    assert lost_sign(values) is None
 
 
 def test_a_torque_far_beyond_the_rated_one_is_reported(tmp_path: Path) -> None:
