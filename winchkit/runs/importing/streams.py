@@ -230,10 +230,11 @@ def _clock(
         values, absolute = (column.values - _EXCEL_EPOCH) * 86_400.0, True
     else:
         absolute = epoch_unit(column.values) == item.unit
-        known = column.known
+        counted = restored(column.values, item.stored)
+        known = counted[np.isfinite(counted)]
         raw = float(known[0]) if len(known) else 0.0
         # The difference first: nanoseconds since 1970 have no digits left for its fraction.
-        return raw * item.factor + item.offset, (column.values - raw) * item.factor, absolute
+        return raw * item.factor + item.offset, (counted - raw) * item.factor, absolute
     known = values[np.isfinite(values)]
     first = float(known[0]) if len(known) else 0.0
     return first, values - first, absolute
