@@ -189,6 +189,24 @@ def test_a_linear_axis_whose_force_is_in_a_file_of_its_own(sign: int, tmp_path: 
     assert run["position"] == pytest.approx(ANGLE / 1000, abs=1e-8)
 
 
+def test_a_mapping_is_not_of_a_file_in_other_units(tmp_path: Path) -> None:
+    """The numbers of mN m and rad came in as N m and degrees."""
+    first = write(tmp_path / "a.csv", "time [s],q [deg],tau [Nm]", TIME, ANGLE, TIME)
+    other = write(tmp_path / "b.csv", "time [s],q [rad],tau [mNm]", TIME, ANGLE / 57.3, 1e3 * TIME)
+    mapping = tmp_path / "runs" / "mapping.toml"
+    command(first, "-o", mapping.parent)
+    code, output = command(other, "--mapping", mapping, "-o", tmp_path / "others")
+    assert code == 3
+    assert "column 'q' is in rad, and the mapping" in output
+    assert "column 'tau' is in mNm, and the mapping" in output
+    # A unit that the user corrects stays corrected, in this file and in the next.
+    given = ("-c", "motor_angle=q [deg]", "-c", "motor_torque=tau*0.5 [N m]")
+    code, output = command(other, *given, "-o", mapping.parent, "--replace")
+    assert code == 0, output
+    (run,) = import_runs(other, mapping=mapping)
+    assert run["motor_torque"] == pytest.approx(500 * TIME, rel=1e-5)
+
+
 def test_the_runs_of_the_command_in_python(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", "time [s],q [deg],tau [%]", TIME, ANGLE, TIME)
     with pytest.raises(UsageError, match="--rated-torque"):
