@@ -171,7 +171,7 @@ def _given_twice(guesses: Sequence[Guess]) -> Iterator[Fault]:
         table = guess.file if guess.axis else guess.table
         columns = {column.source: column for column in table.columns}
         used = [(item, columns[item.source]) for item in guess.used]
-        moving = any(len(set(c.known)) > 1 for item, c in used if item.channel != "time")
+        moving = any((c.known != c.known[:1]).any() for i, c in used if i.channel != "time")
         content = tuple(
             (item.channel, item.factor, sha256(c.values.tobytes()).digest(), tuple(c.texts or ()))
             for item, c in used
