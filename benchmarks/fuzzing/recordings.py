@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -331,15 +332,15 @@ class _Writer:
 
     def _spoiled(self, heads: list[str], cells: list[list[str]]) -> None:
         """Cells in exponents, missing cells, and set points beside the measured columns."""
+        # Stamps of many digits would lose some, and rows without a stamp are refused.
+        places = [at for at, head in enumerate(heads) if head.split(" [")[0] not in {"Time", "t"}]
         if self.chance(0.1, "exponents"):
-            for row in cells:
-                row[1:] = [c if ":" in c else f"{float(c):.12e}" for c in row[1:]]
+            for row, at in product(cells, places):
+                row[at] = f"{float(row[at]):.12e}"
         if self.chance(0.1, "missing cells"):
             text = self.pick(("", "NaN", "-", "n/a"))
-            for row in cells:
-                for at in range(1, len(row)):
-                    if ":" not in row[at] and heads[at] not in {"Time", "t"}:
-                        row[at] = text if self.rng.random() < 0.01 else row[at]
+            for row, at in product(cells, places):
+                row[at] = text if self.rng.random() < 0.01 else row[at]
         if self.chance(0.15, "set points"):
             at = int(self.rng.integers(1, len(heads)))
             name, _, unit = heads[at].partition(" [")
@@ -367,7 +368,9 @@ class _Writer:
         elif not comma and self.chance(0.05, "a name before each value"):
             named = [[f"{h}:{c}" for h, c in zip(heads, row, strict=True)] for row in cells]
             lines = ["Boot of recorder 7", *(mark.join(row) for row in named)]
-        if self.chance(0.08, "cut off"):
+        # The part that is left may have negative numbers only, which do not show a lost sign.
+        is_lost = any(change.startswith("lost sign") for change in self.changes)
+        if not is_lost and self.chance(0.08, "cut off"):
             kept = int(self.rng.integers(len(lines) // 3, len(lines)))
             last = lines[kept - 1]
             lines = [*lines[: kept - 1], last[: int(self.rng.integers(1, len(last) + 1))]]
