@@ -112,6 +112,10 @@ BY_HAND = {
     '"01:00:01.00";"5FF";"Std";"";"01 "\n',
     "CSV with units": "Time [ms];Channel;CAN ID;DLC;Data\n250;1;0x181;3;37 06 FF\n500;1;0x80;0;\n"
     "1000;1;0x5FF;1;01\n",
+    "CSV in German": "Zeit [ms];Kanal;ID (hex);DLC;Daten (hex)\n250,0;1;181;3;37 06 FF\n"
+    "500,0;1;80;0;\n1000,0;1;5FF;1;01\n",
+    "CSV with another name of the time": "Uhr [ms];ID;DLC;Data\n250,0;0x181;3;37 06 FF\n"
+    "500,0;0x80;0;\n1000,0;0x5FF;1;01\n",
     "CSV with decimal identifiers": "time (s),id,data\n0.25,385,3706FF\n0.5,128,\n1.0,1535,01\n",
 }
 
@@ -143,6 +147,14 @@ def test_remote_and_error_frames_are_counted(tmp_path: Path) -> None:
     assert [one.data for one in trace.frames] == [b"\x05", b"\x7f", b""]
     assert trace.notes[0].startswith("lines that are no frames: 1")
     assert trace.notes[1].endswith("left out: 1")
+
+
+def test_times_of_a_trace_without_a_head_are_said_to_be_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "t.txt"
+    path.write_text("".join(f"{250 * n}.0 0x181 3 37 06 FF\n" for n in range(4)))
+    trace = read_trace(path)
+    assert (trace.layout, trace.frames[1].time) == ("text", 250.0)
+    assert any("taken as seconds" in note for note in trace.notes)
 
 
 def test_a_text_with_few_lines_like_frames_is_no_trace(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from winchkit.can_trace_lines import (
     READERS,
+    SECONDS,
     TraceLine,
     asc,
     base_of,
@@ -189,7 +190,7 @@ def _format_of(lines: Sequence[str]) -> tuple[str, Callable[[str], TraceLine | N
     head = csv_head(filled)
     if head is not None:
         return "CSV", head.read, list(head.notes)
-    return "text", general, []
+    return "text", general, [f"the times have no unit that is known: {SECONDS}"]
 
 
 def _in_time(

@@ -52,18 +52,20 @@ _CLOCK = re.compile(r"(\d+):(\d\d):(\d\d[.,]\d+)")
 
 _TIME, _IDENTIFIER, _DATA, _LENGTH, _BUS = "time", "identifier", "data", "length", "bus"
 _COLUMNS = {
-    _TIME: r"time ?stamp|(abs(olute)? |rel(ative)? )?time( offset)?|t",
+    _TIME: r"time ?stamp|(abs(olute)? |rel(ative)? )?time( offset)?|t|zeit(stempel)?|temps|tiempo",
     _IDENTIFIER: r"(can ?|arbitration ?|message ?|msg ?|cob ?)?(id|identifier)",
-    _DATA: r"(data|payload)( ?bytes?)?",
-    _LENGTH: r"(data ?)?(len|length)|dlc",
-    _BUS: r"bus|channel|interface",
+    _DATA: r"(data|payload|daten|données|datos)( ?bytes?)?",
+    _LENGTH: r"(data ?)?(len|length)|dlc|länge|longueur|longitud",
+    _BUS: r"bus|channel|interface|kanal|canal",
     "remote": r"(is )?(remote|rtr)( frame)?|flags",
     "error": r"(is )?error( frame)?",
 }
 """Names of the columns of a CSV trace, in lower case, without units and with spaces for ``_``."""
+SECONDS = "numbers with a fraction are taken as seconds, others are no times"
 _BYTE_COLUMN = re.compile(r"(?:d|b|data|byte|data byte)? ?(\d)")
 _UNITS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 _UNIT = re.compile(r"[\[(_ ](s|sec|seconds|ms|us|µs|ns)[\])]?$")
+_BRACKETED = re.compile(r"[\[(](s|sec|seconds|ms|us|µs|ns)[\])]$")
 
 
 @dataclass(frozen=True)
@@ -268,6 +270,8 @@ def csv_head(lines: Sequence[str]) -> CsvHead | None:
             found = [n for n, name in enumerate(names) if re.fullmatch(pattern, _without(name))]
             if found:
                 places[key] = found[0]
+        if timed := [n for n, cell in enumerate(cells) if _BRACKETED.search(cell.lower())]:
+            places.setdefault(_TIME, timed[0])
         singles = [n for n, name in enumerate(names) if _BYTE_COLUMN.fullmatch(name)]
         if _IDENTIFIER not in places or not (_DATA in places or singles):
             continue
@@ -301,5 +305,4 @@ def _time_scale(cell: str, *, is_savvy: bool) -> tuple[float, tuple[str, ...]]:
         return _UNITS[found[1]], ()
     if is_savvy:
         return 1e-6, ("times are in microseconds, as SavvyCAN writes them",)
-    note = "numbers with a fraction are taken as seconds, others are no times"
-    return math.nan, (f"'{cell}' has no unit: {note}",)
+    return math.nan, (f"'{cell}' has no unit: {SECONDS}",)

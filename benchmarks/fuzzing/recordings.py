@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -317,13 +318,49 @@ class _Writer:
             writer.finish()
         return path
 
+    def _heads(self, heads: list[str]) -> list[list[str]]:
+        """Rows of the header, with the units where recorders write them."""
+        parts = [(name, unit.rstrip("]")) for name, _, unit in (h.partition(" [") for h in heads)]
+        if all(unit for _, unit in parts) and self.chance(0.15, "units in a row of their own"):
+            return [[name for name, _ in parts], [f"({unit})" for _, unit in parts]]
+        if self.chance(0.15, "units in parentheses"):
+            return [[f"{name} ({unit})" if unit else name for name, unit in parts]]
+        plain = all(unit.isalnum() or not unit for _, unit in parts)
+        if plain and self.chance(0.15, "units behind the names"):
+            return [[f"{_key(name)}_{unit}" if unit else _key(name) for name, unit in parts]]
+        return [heads]
+
+    def _spoiled(self, heads: list[str], cells: list[list[str]]) -> None:
+        """Cells in exponents, missing cells, and set points beside the measured columns."""
+        # Stamps of many digits would lose some, and rows without a stamp are refused.
+        places = [at for at, head in enumerate(heads) if head.split(" [")[0] not in {"Time", "t"}]
+        if self.chance(0.1, "exponents"):
+            for row, at in product(cells, places):
+                row[at] = f"{float(row[at]):.12e}"
+        if self.chance(0.1, "missing cells"):
+            text = self.pick(("", "NaN", "-", "n/a"))
+            for row, at in product(cells, places):
+                row[at] = text if self.rng.random() < 0.01 else row[at]
+        if self.chance(0.15, "set points"):
+            at = int(self.rng.integers(1, len(heads)))
+            name, _, unit = heads[at].partition(" [")
+            if name not in {"Time", "t"}:
+                word = self.pick(("setpoint", "target", "Soll", "cmd"))
+                heads.append(f"{name} {word}" + f" [{unit}" * bool(unit))
+                for now, later in zip(cells, [*cells[7:], *cells[:7]], strict=True):
+                    now.append(later[at])
+
     def _text(self, path: Path, heads: list[str], cells: list[list[str]]) -> Path:
+        self._spoiled(heads, cells)
         mark = self.pick((",", ";", "\t", "|"))
         comma = mark != "," and self.chance(0.4, "decimal comma")
         if comma:
             cells = [[c if ":" in c else c.replace(".", ",") for c in row] for row in cells]
-        head = mark.join(heads)
-        lines = [head, *(mark.join(row) for row in cells)]
+        rows = [*self._heads(heads), *cells]
+        if self.chance(0.1, "quotes"):
+            rows = [[f'"{cell}"' for cell in row] for row in rows]
+        end = mark * self.chance(0.08, "a separator behind each row")
+        head, *_ = lines = [mark.join(row) + end for row in rows]
         if self.chance(0.2, "lines above the header"):
             lines = ["Recorder 7", f"Exported{mark}yes", *lines]
         if self.chance(0.05, "a summary below the rows"):
@@ -331,7 +368,9 @@ class _Writer:
         elif not comma and self.chance(0.05, "a name before each value"):
             named = [[f"{h}:{c}" for h, c in zip(heads, row, strict=True)] for row in cells]
             lines = ["Boot of recorder 7", *(mark.join(row) for row in named)]
-        if self.chance(0.08, "cut off"):
+        # The part that is left may have negative numbers only, which do not show a lost sign.
+        is_lost = any(change.startswith("lost sign") for change in self.changes)
+        if not is_lost and self.chance(0.08, "cut off"):
             kept = int(self.rng.integers(len(lines) // 3, len(lines)))
             last = lines[kept - 1]
             lines = [*lines[: kept - 1], last[: int(self.rng.integers(1, len(last) + 1))]]

@@ -88,6 +88,8 @@ class MappedColumn(Table):
     magnitude 65536`` for ones without their sign, with the number of values of the field;
     ``rotation vector`` for the three components of one in place of roll, pitch and yaw, ``angles
     of Rx Ry Rz`` for theirs."""
+    written: str = ""
+    """Unit in the header of the file, where it is another one than ``unit``, which counts."""
 
     def rules(self) -> Iterator[Rule]:
         """The channel exists, and the factor is known."""

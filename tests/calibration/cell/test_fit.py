@@ -12,7 +12,7 @@ from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
 from winchkit.arrays import Array
-from winchkit.calibration.cell.fit import fit_cell
+from winchkit.calibration.cell.fit import WEIGHT_CLASSES, fit_cell
 from winchkit.calibration.cell.weighing_order import plan
 from winchkit.errors import RunError, UsageError
 from winchkit.schema.calibration import CalibrationPoint
@@ -86,6 +86,19 @@ def test_noise_in_the_readings_leaves_the_gain_and_its_interval_right(samples: i
         gains.append(fit.coefficients[1])
     assert inside / 400 == pytest.approx(0.95, abs=0.04)
     assert np.mean(gains) == pytest.approx(1 / 7.13, abs=4 * np.std(gains) / 20 + 1e-4)
+
+
+def test_a_common_error_of_the_weights_is_in_the_uncertainty() -> None:
+    """True loads are off by up to the tolerance of class M3, evenly distributed."""
+    rng, tolerance = np.random.default_rng(3), WEIGHT_CLASSES["M3"]
+    loads, found = np.arange(20) * 10.0, []
+    for error in rng.uniform(-tolerance, tolerance, 1000):
+        readings = 40 + 7.13 * loads * (1 + error) + rng.normal(0, 0.02, 20)
+        measured = [CalibrationPoint(a, b) for a, b in zip(loads, readings, strict=True)]
+        fit = fit_cell(measured, tolerance=tolerance)
+        found.append([*fit.coefficients, *fit.std])
+    scatter, stated = np.std(found, axis=0)[:2], np.mean(found, axis=0)[2:]
+    assert stated == pytest.approx(scatter, rel=0.08)
 
 
 def test_a_moved_zero_is_no_hysteresis() -> None:

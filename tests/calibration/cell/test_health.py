@@ -53,6 +53,13 @@ def test_a_good_cell_is_reported_in_numbers_and_without_remarks() -> None:
     assert health.remarks == ()
 
 
+def test_counts_that_stand_still_at_an_end_of_their_range_may_saturate() -> None:
+    samples = made(hum=0.0)
+    samples.value[300:700] = 103.0
+    samples.raw[300:700] = 103.0 / DIVISION
+    assert "at the end of their range" in remarks(examine(samples))
+
+
 def test_a_drift_is_found_with_its_uncertainty() -> None:
     health = examine(made(drift=0.2))
     assert health.drift == pytest.approx(0.2, abs=4 * health.drift_std)

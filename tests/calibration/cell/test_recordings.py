@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from winchkit.calibration.cell.health import is_wrong
 from winchkit.calibration.cell.recordings import CellFindings, recorded_cell_health
 from winchkit.errors import RunError
 
@@ -136,17 +137,27 @@ def test_hum_above_half_the_rate_may_be_a_vibration(path: Path) -> None:
     assert any("50 Hz, or a vibration of 14 Hz" in text for text in slow.remarks)
 
 
-def test_a_converter_at_its_end_is_said_to_saturate_or_to_be_stuck(path: Path) -> None:
+@pytest.mark.parametrize("swing", [0.0, 3000.0])
+def test_saturated_readings_are_wrong_and_left_out(path: Path, swing: float) -> None:
     time, value = signal()
-    cut = np.minimum(value + 3000 * np.sin(2 * np.pi * time / 9), 52_000)
-    assert any("at the end of their range" in text for text in findings(path, time, cut).remarks)
+    cut = np.minimum(value + swing * np.sin(2 * np.pi * time / 9), 52_000)
+    cut[1000:1100] = 52_000
+    found = findings(path, time, cut)
+    at_end = int(np.count_nonzero(cut == 52_000))
+    assert (found.health.saturated, found.health.usable) == (at_end, len(cut) - at_end)
+    assert swing or found.health.noise == pytest.approx(NOISE, rel=0.05)
+    assert is_wrong(found.health)
+    assert any(text.endswith("the logger saturates") for text in found.remarks)
 
 
-def test_saturation_is_reported(path: Path) -> None:
-    time, value = signal()
-    swing = value + 3000 * np.sin(2 * np.pi * time / 9)
-    found = findings(path, time, np.minimum(swing, 52_000))
-    assert any("saturates" in text for text in found.remarks)
+def test_rows_without_times_have_the_rate_that_is_given(path: Path) -> None:
+    _, value = signal()
+    path.write_text("\n".join(f"{reading:.0f}" for reading in value) + "\n")
+    with pytest.raises(RunError, match="--sample-rate"):
+        recorded_cell_health(path)
+    (found,) = recorded_cell_health(path, sample_rate=RATE)
+    assert found.health.rate == pytest.approx(RATE)
+    assert found.health.noise == pytest.approx(NOISE, rel=0.05)
 
 
 def test_figures_are_of_the_longest_stretch_and_creep_of_the_largest_change(path: Path) -> None:

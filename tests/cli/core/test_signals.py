@@ -92,3 +92,19 @@ def test_what_computes_in_threads_ends_with_the_code_of_its_signal(number: int, 
         "    time.sleep(10)\n"
     )
     assert done.returncode == code, done.stderr
+
+
+def test_a_terminal_that_was_closed_without_a_signal_ends_a_command_in_one_sentence() -> None:
+    """As of a question under ``nohup``, whose prompt has no terminal any more."""
+    done = run(
+        "import os, pty\n"
+        "from winchkit.cli.core.outcome import finish\n"
+        "def command():\n"
+        "    master, terminal = pty.openpty()\n"
+        "    os.dup2(terminal, 1)\n"
+        "    os.close(terminal)\n"
+        "    os.close(master)\n"
+        "    os.write(1, b'? ')\n"
+        "finish(command)\n"
+    )
+    assert (done.returncode, done.stderr) == (129, "winchkit: the terminal was closed\n")

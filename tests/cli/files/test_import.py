@@ -79,8 +79,8 @@ def test_the_angle_of_a_recording_of_the_velocity_is_its_integral(tmp_path: Path
 
 def test_two_recordings_of_the_velocity_are_two_runs(tmp_path: Path) -> None:
     paths = []
-    for name in ("a", "b"):
-        rows = (f"{k / 100},{5 + k % 3},{k % 5}" for k in range(100))
+    for name, first in (("a", 5), ("b", 6)):
+        rows = (f"{k / 100},{first + k % 3},{k % 5}" for k in range(100))
         paths.append(tmp_path / f"{name}.csv")
         paths[-1].write_text("\n".join(["time [s],speed [rpm],torque [Nm]", *rows]) + "\n")
     result = command(*paths, "-o", tmp_path / "runs", "--yes")
@@ -256,9 +256,9 @@ def test_recordings_are_never_written_over(tmp_path: Path) -> None:
 
 
 def test_files_of_one_name_become_different_runs(tmp_path: Path) -> None:
-    for folder in ("a", "b"):
+    for folder, unit in (("a", "[Nm]"), ("b", "[mNm]")):
         (tmp_path / folder).mkdir()
-        log(tmp_path / folder / "log.csv", HEAD.replace("[%]", "[Nm]"))
+        log(tmp_path / folder / "log.csv", HEAD.replace("[%]", unit))
     result = command(tmp_path / "a/log.csv", tmp_path / "b/log.csv", "-o", tmp_path / "runs")
     assert result.exit_code == 0, result.output
     assert sorted(os.listdir(tmp_path / "runs")) == ["log-2.csv", "log.csv", "mapping.toml"]

@@ -6,6 +6,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calibration_cases import rows
@@ -31,6 +32,26 @@ def test_the_answer_with_the_next_command_is_one_screen(elastic: list[Path]) -> 
     assert lines[1].startswith("The cable is elastic. With it, the cable length error falls from")
     assert "power" not in result.stdout
     assert "next: winchkit add cable-elongation-linear --fit" in result.stderr
+
+
+def test_no_programme_is_planned_for_an_axis(tmp_path: Path) -> None:
+    """Motion programmes are in cable length; the answer lists the next runs."""
+    time = np.arange(600) / 100
+    head = "time [s],motor_angle [rad],motor_torque [N m]"
+    runs = [tmp_path / f"run{n}.csv" for n in range(2)]
+    for seed, path in enumerate(runs):
+        torque = 0.5 * np.tanh(6 * np.cos(2 * time) / 0.1)
+        torque += np.random.default_rng(seed).normal(0, 0.01, len(time))
+        table = np.column_stack([time, 3 * np.sin(2 * time), torque])
+        np.savetxt(path, table, "%.6f", ",", header=head, comments="")
+    profile = tmp_path / "axis.toml"
+    profile.write_text(
+        'schema = 1\nkind = "axis"\nname = "joint"\n'
+        '[[effect]]\nid = "motor-coulomb"\ntorque = "0.5 N m"\ntransition = "0.1 rad/s"\n'
+    )
+    result = done("diagnose", *runs, "-p", profile)
+    assert result.stdout.startswith("ADEQUATE")
+    assert "winchkit plan" not in result.stderr
 
 
 def test_verbose_adds_how_it_was_reached(elastic: list[Path]) -> None:

@@ -64,7 +64,7 @@ def test_times_that_stand_still_have_their_lines(tmp_path: Path) -> None:
 
 def test_a_clock_coarser_than_the_sampling_is_named_with_its_option(tmp_path: Path) -> None:
     lines = [HEAD, *(f"{k // 10 / 10:.1f};{k};1" for k in range(100))]
-    with pytest.raises(RunError, match=r"90 of 100 time stamps repeat.*--sample-rate \"110 Hz\""):
+    with pytest.raises(RunError, match=r"90 of 100 time stamps repeat.*--sample-rate \"100 Hz\""):
         run(tmp_path / "log.csv", lines)
     guess = guess_columns(read_table(tmp_path / "log.csv"), Answers(sample_rate=100.0))
     found = run_of(streams_of(guess), {})

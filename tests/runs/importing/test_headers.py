@@ -125,3 +125,41 @@ def test_remarks_may_stand_between_names_and_numbers(tmp_path: Path) -> None:
 def test_the_unit_of_a_row_counts_before_that_of_a_name(tmp_path: Path) -> None:
     found = used(tmp_path / "axis.csv", "t_s,pos_m,F_N\nms,mm,N\n" + rows(1, 2))
     assert (found["time"].factor, found["position"].factor) == (1e-3, 1e-3)
+
+
+STRANGERS = {
+    # Dynamometers of a planetary gearbox, of motors, and of a joint.
+    "# Test started\n# limit = 25.0 A\ntime [s],velocity setpoint [Hz],velocity measured [Hz],"
+    "motor torque measured [Nm],load cell weight [g],brake torque [Nm]\n": {
+        "motor_velocity": "velocity measured",
+        "motor_torque": "motor torque measured",
+        "tension": "load cell weight",
+    },
+    "2026-05-11 15:22:21.215\nInput time, Input voltage, Output Torque, Output Speed, Output Speed "
+    "set-point\nms, V, N.mm, rad.s, rad.s\n": {
+        "motor_torque": "Output Torque",
+        "motor_velocity": "Output Speed",
+    },
+    "Elapsed Time(ms),R_knee_fault,R_knee_enc,R_knee_T_des\n": {"motor_angle": "R_knee_enc"},
+    # A winch of a glider, a machine for tension tests, and two oscilloscopes.
+    "Time_ms;dt_ms;CurrentEncoderReading;AngularIncrement_deg;RopeVelocity_kmh;RopeLength_m;"
+    "DesiredVelocity_kmh\n": {
+        "motor_angle": "CurrentEncoderReading",
+        "cable_length": "RopeLength",
+    },
+    "Results Table 1\n\n\nTime,Displacement,Force\n(ms),(mm),(kN)\n": {
+        "position": "Displacement",
+        "force": "Force",
+    },
+    "in s,C2 in V\n": {},
+}
+"""Heads as strangers have them, and the right columns; none is taken for another channel."""
+
+
+@pytest.mark.parametrize("head", STRANGERS)
+def test_columns_of_strangers(head: str, tmp_path: Path) -> None:
+    names = head.splitlines()[-2 if head.endswith(("(kN)\n", "rad.s\n")) else -1]
+    delimiter = ";" if ";" in names else ","
+    table = rows(*names.split(delimiter)[1:]).replace(",", delimiter)
+    found = used(tmp_path / "log.csv", head + table)
+    assert {c: i.source for c, i in found.items() if c != "time"} == STRANGERS[head]

@@ -55,6 +55,21 @@ def test_a_column_of_one_of_several_files_without_names(tmp_path: Path) -> None:
     assert "there is no file 'pos2.t'" in output
 
 
+@pytest.mark.parametrize("join", [(), ("--join",)])
+def test_a_recording_given_twice_is_no_repeat(tmp_path: Path, join: tuple[str, ...]) -> None:
+    head = "time [s],angle [deg],torque [N m]"
+    one = write(tmp_path / "one.csv", head, TIME, ANGLE, np.cos(TIME))
+    copy = write(tmp_path / "copy.csv", head, TIME, ANGLE, np.cos(TIME))
+    repeat = write(tmp_path / "repeat.csv", head, TIME, ANGLE + 0.01, np.cos(TIME))
+    for other in (one, copy):
+        code, output = command(one, other, "-o", tmp_path / "runs", *join)
+        assert code == 3
+        assert f"has the same numbers as {one}, and is no repeat of it: give it once" in output
+        assert not (tmp_path / "runs").exists()
+    code, output = command(one, repeat, "-o", tmp_path / "runs", *join)
+    assert code == 0, output
+
+
 def imported(path: Path, *given: str) -> Run:
     guess = guess_columns(read_table(path), Answers(tuple(map(read_column, given))))
     assert not guess.questions, guess.questions
@@ -113,6 +128,24 @@ def test_a_single_row_out_of_order_is_left_out(shift: float, tmp_path: Path) -> 
     assert any("1 of 200 rows (line 79)" in note for note in run.notes)
 
 
+@pytest.mark.parametrize("is_reversed", [False, True])
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_few_rows_without_a_time_are_left_out(
+    count: int, is_reversed: bool, tmp_path: Path
+) -> None:
+    time = TIME.copy()
+    time[[77, 120, 140][:count]] = np.nan
+    step = -1 if is_reversed else 1
+    path = write(tmp_path / "a.csv", "time [s],q [deg]", time[::step], ANGLE[::step])
+    if count > 2:
+        with pytest.raises(RunError, match="time is missing here"):
+            imported(path)
+        return
+    run = imported(path)
+    assert run["motor_angle"] == pytest.approx(np.radians(np.delete(ANGLE, [77, 120])), abs=1e-6)
+    assert any("2 of 200 rows" in note and "have no time" in note for note in run.notes)
+
+
 @pytest.mark.parametrize("back", [1.5, 3.0, 60.0])
 def test_a_clock_that_is_set_back_is_refused(back: float, tmp_path: Path) -> None:
     time = np.where(np.arange(200) < 100, TIME, TIME - back / 50)
@@ -136,7 +169,8 @@ def test_sixteen_files_of_one_kind_are_one_table(is_uneven: bool, tmp_path: Path
     assert code == 0
     assert output.count("motor_angle  ") == 1
     assert len(output.splitlines()) <= 40
-    _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, 5 * ANGLE, TIME) for p in paths])
+    turned = [(path, 5 * ANGLE + n) for n, path in enumerate(paths)]
+    _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, q, TIME) for p, q in turned])
     assert shown.count("? 'q'") == 1
 
 
@@ -153,6 +187,24 @@ def test_a_linear_axis_whose_force_is_in_a_file_of_its_own(sign: int, tmp_path: 
     assert set(run) == {"position", "velocity", "force"}
     assert run["force"] == pytest.approx(1000 * TIME, abs=1e-6)
     assert run["position"] == pytest.approx(ANGLE / 1000, abs=1e-8)
+
+
+def test_a_mapping_is_not_of_a_file_in_other_units(tmp_path: Path) -> None:
+    """The numbers of mN m and rad came in as N m and degrees."""
+    first = write(tmp_path / "a.csv", "time [s],q [deg],tau [Nm]", TIME, ANGLE, TIME)
+    other = write(tmp_path / "b.csv", "time [s],q [rad],tau [mNm]", TIME, ANGLE / 57.3, 1e3 * TIME)
+    mapping = tmp_path / "runs" / "mapping.toml"
+    command(first, "-o", mapping.parent)
+    code, output = command(other, "--mapping", mapping, "-o", tmp_path / "others")
+    assert code == 3
+    assert "column 'q' is in rad, and the mapping" in output
+    assert "column 'tau' is in mNm, and the mapping" in output
+    # A unit that the user corrects stays corrected, in this file and in the next.
+    given = ("-c", "motor_angle=q [deg]", "-c", "motor_torque=tau*0.5 [N m]")
+    code, output = command(other, *given, "-o", mapping.parent, "--replace")
+    assert code == 0, output
+    (run,) = import_runs(other, mapping=mapping)
+    assert run["motor_torque"] == pytest.approx(500 * TIME, rel=1e-5)
 
 
 def test_the_runs_of_the_command_in_python(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Stamps of whole seconds and a fraction in two columns, as ROS, C and EPICS write them."""
+"""Stamps in two columns, as ROS, C and EPICS write them, and counts from other epochs than 1970."""
 
 from __future__ import annotations
 
@@ -184,3 +184,31 @@ def test_a_fraction_beside_times_of_day(tmp_path: Path, title: str, digits: int)
     table = guess_columns(read_table(path))
     run = run_of(streams_of(table), {})
     assert np.allclose(np.diff(run.time), 7e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("zero", "unit", "digits", "name"),
+    [
+        ("1601-01-01", 1e-7, 0, "100ns since 1601 (FILETIME of Windows)"),
+        ("0001-01-01", 1e-7, 0, "100ns since the year 1 (ticks of .NET)"),
+        ("1904-01-01", 1.0, 6, "s since 1904 (LabVIEW)"),
+        ("0000-01-01", 86_400.0, 11, "d since the year 0 (datenum)"),
+    ],
+)
+def test_numbers_of_other_epochs_are_an_assumption(
+    tmp_path: Path, zero: str, unit: float, digits: int, name: str
+) -> None:
+    """Against numpy's calendar; datenum is 1 at the start of the year 0."""
+    at, time = np.datetime64("2026-09-21T14:13:20"), np.arange(300) * 0.01
+    since = (at - np.datetime64(zero)) / np.timedelta64(1, "s") + (unit == 86_400.0) * unit
+    rows = [f"{(since + t) / unit:.{digits}f},{np.sin(t):.5f}" for t in time]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time,angle [rad]", *rows]) + "\n")
+    found = guess_columns(read_table(path))
+    (clock,) = (item for item in found.used if item.channel == "time")
+    assert (clock.confidence, clock.reason) == ("assumed", f"{name} by its numbers")
+    streams = streams_of(found)
+    assert streams.is_absolute
+    unix = (at - np.datetime64("1970-01-01")) / np.timedelta64(1, "s")
+    assert streams.origin == pytest.approx(unix, abs=1e-3)
+    assert streams.streams[0].time == pytest.approx(time, abs=2e-5)

@@ -13,7 +13,11 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from winchkit.arguments import path_of
+from winchkit.calibration.cell.creep import creep_shape, creep_within
+from winchkit.calibration.cell.fit import FigureOfMerit
 from winchkit.errors import Fault, FileError, RunError, suggest
 from winchkit.regular_file import read_whole
 from winchkit.runs.files import write_whole
@@ -24,6 +28,7 @@ from winchkit.runs.importing.formats.dialect import (
     find_dialect,
     split_line,
 )
+from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.units.known import BRIDGE, COUNTS
 from winchkit.runs.importing.units.spelling import read_unit, split_unit
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
@@ -36,7 +41,7 @@ _LARGEST = 10_000_000
 """Bytes of a file of points: some hundred thousand readings."""
 _RAW = (COUNTS, BRIDGE, "voltage")
 """Dimensions of readings in a unit of their own."""
-_COLUMNS = ("load", "indicated", "std", "going", "series")
+_COLUMNS = ("load", "indicated", "std", "going", "series", "time")
 
 
 def calibration_toml(calibration: CellCalibration) -> str:
@@ -91,6 +96,10 @@ class PointFile:
 
     points: tuple[CalibrationPoint, ...]
     unit: str = "N"
+    creep_shape: tuple[float, ...] = ()
+    """Change of each point by a creep of the whole load, N; empty without times."""
+    creep: FigureOfMerit | None = None
+    """Between 1 and 30 minutes, as a share of the change of load; None without times."""
 
 
 def read_points(path: str | Path) -> PointFile:
@@ -101,9 +110,9 @@ def read_points(path: str | Path) -> PointFile:
     path
         File with the columns ``load`` in any unit of force or mass and ``indicated`` (or
         ``reading``) in such a unit or in counts, mV/V or V (counts without a unit); optional
-        ``std``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
-        follows from the order of the loads. Separator, decimal sign and encoding follow from the
-        content.
+        ``std``, ``going`` (up, down), ``series`` (1, 2, …) and ``time`` (with a unit, or stamps).
+        Without ``going`` the direction follows from the order of the loads. Separator, decimal sign
+        and encoding follow from the content.
 
     Returns
     -------
@@ -137,25 +146,35 @@ def read_points(path: str | Path) -> PointFile:
     columns, unit = _columns(rows[0][1], str(path), rows[0][0])
     faults: list[Fault] = []
     points: list[CalibrationPoint] = []
+    times: list[float] = []
     for number, row in rows[1:]:
         try:
             points.append(_read_point(row, columns, points, decimal))
+            times += [_read_time(row, columns, times, decimal)] if "time" in columns else []
         except (ValueError, IndexError) as error:
             faults.append(Fault(f"cannot be read: {error}", str(path), number))
     if faults:
         raise FileError(faults)
-    return PointFile(tuple(points) if "std" in columns else _averaged(points), unit)
+    stretches = _stretches(points) if "std" not in columns else [[k] for k in range(len(points))]
+    found = points if "std" in columns else [_averaged(points, own) for own in stretches]
+    if not times:
+        return PointFile(tuple(found), unit)
+    shape = creep_shape(points, times)
+    means = tuple(float(np.mean(shape[own])) for own in stretches)
+    return PointFile(tuple(found), unit, means, creep_within(points, shape, stretches))
 
 
-def _averaged(points: Sequence[CalibrationPoint]) -> tuple[CalibrationPoint, ...]:
-    """One point in place of several that follow each other at one load."""
-    found = []
-    for _, items in groupby(points, lambda point: (point.load, point.series, point.going)):
-        own = list(items)
-        values = [point.indicated for point in own]
-        std = statistics.stdev(values) / math.sqrt(len(own)) if len(own) > 1 else 0.0
-        found.append(dataclasses.replace(own[0], indicated=statistics.fmean(values), std=std))
-    return tuple(found)
+def _stretches(points: Sequence[CalibrationPoint]) -> list[list[int]]:
+    """Rows that follow each other at one load."""
+    keys = [(point.load, point.series, point.going) for point in points]
+    return [list(rows) for _, rows in groupby(range(len(points)), keys.__getitem__)]
+
+
+def _averaged(points: Sequence[CalibrationPoint], rows: Sequence[int]) -> CalibrationPoint:
+    """One point in place of several at one load."""
+    values = [points[row].indicated for row in rows]
+    std = statistics.stdev(values) / math.sqrt(len(rows)) if len(rows) > 1 else 0.0
+    return dataclasses.replace(points[rows[0]], indicated=statistics.fmean(values), std=std)
 
 
 def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[int, float]], str]:
@@ -183,11 +202,36 @@ def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[i
                 message = f"column '{title.strip()}' has {given}; write {name} [N], [kg], [lb]"
                 message += "" if key == "load" else ", [counts], [mV/V]"
                 raise FileError(Fault(f"{message} or another unit of force or mass", path, line))
+        if key == "time" and written:
+            known = read_unit(written)
+            if known is None or known.dimension != "time":
+                raise FileError(
+                    Fault(f"column '{title.strip()}' is in no unit of time", path, line)
+                )
+            factor = known.factor
+        elif key == "time":
+            factor = math.nan
         found[key] = (place, factor)
     missing = [key for key in ("load", "indicated") if key not in found]
     if missing:
         raise FileError(Fault(f"lacks the column {' and '.join(missing)}", path, line))
     return found, unit
+
+
+def _read_time(
+    row: list[str], columns: dict[str, tuple[int, float]], before: Sequence[float], decimal: str
+) -> float:
+    """Seconds of a number with a unit, or of a stamp; raises ValueError where they do not rise."""
+    place, factor = columns["time"]
+    text = row[place]
+    number = float(read_stamps([text]).values[0]) if math.isnan(factor) else math.nan
+    if not math.isnan(factor) and (value := read_number(text, decimal)) is not None:
+        number = value * factor
+    if not math.isfinite(number):
+        raise ValueError(f"time '{text}' is neither a stamp nor a number with a unit, time [s]")
+    if before and number <= before[-1]:
+        raise ValueError(f"time '{text}' is not after that of the reading before")
+    return number
 
 
 def _read_point(

@@ -73,8 +73,14 @@ class CellFit:
         return tuple(math.sqrt(row[k]) for k, row in enumerate(self.covariance))
 
 
+WEIGHT_CLASSES = {"E2": 1.6e-6, "F1": 5e-6, "F2": 1.6e-5, "M1": 5e-5, "M2": 1.6e-4, "M3": 5e-4}
+"""Maximum permissible error by accuracy class, as a share of weights from 100 g (OIML R 111-1)."""
+
+
 def fit_cell(
-    points: Sequence[CalibrationPoint], order: Literal["linear", "quadratic"] = "linear"
+    points: Sequence[CalibrationPoint],
+    order: Literal["linear", "quadratic"] = "linear",
+    tolerance: float = 0.0,
 ) -> CellFit:
     """Fit a calibration.
 
@@ -84,6 +90,9 @@ def fit_cell(
         Known loads with indicated forces.
     order
         Line or parabola.
+    tolerance
+        Maximum permissible error of the weights, as a share of them. An error of this size over √3
+        that all weights have in common is added to the covariance; it is a factor of the force.
 
     Returns
     -------
@@ -106,6 +115,7 @@ def fit_cell(
     line, line_covariance, from_line, _ = _least_squares(indicated, load, 1)
     _refuse_slope(float(line[1]), math.sqrt(float(line_covariance[1, 1])))
     groups = _groups(load, span)
+    covariance = covariance + tolerance**2 / 3 * np.outer(coefficients, coefficients)
     return CellFit(
         tuple(float(c) for c in coefficients),
         tuple(tuple(float(c) for c in row) for row in covariance),

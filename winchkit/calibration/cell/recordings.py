@@ -34,6 +34,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.outliers import outlier_mask, spike_size
 from winchkit.runs.sanity.quantisation import resolution
+from winchkit.runs.sanity.saturation import at_limit
 from winchkit.schema.mapping import DATE
 
 _FORCES = ("tension_gross", "tension", "load_gross", "load")
@@ -97,7 +98,9 @@ class CellFindings:
     remarks: tuple[str, ...]
 
 
-def recorded_cell_health(path: str | Path, column: str | None = None) -> tuple[CellFindings, ...]:
+def recorded_cell_health(
+    path: str | Path, column: str | None = None, sample_rate: float | None = None
+) -> tuple[CellFindings, ...]:
     """Examine recordings of load cells, which need no motion and no calibration.
 
     Parameters
@@ -106,6 +109,8 @@ def recorded_cell_health(path: str | Path, column: str | None = None) -> tuple[C
         A run, a log, or a file of another program in any format of ``winchkit import``.
     column : str, optional
         Name or number of the cell's column; by default all columns that are a cell's.
+    sample_rate : float, optional
+        Rate of the rows of a file without times, Hz.
 
     Returns
     -------
@@ -117,15 +122,18 @@ def recorded_cell_health(path: str | Path, column: str | None = None) -> tuple[C
     RunError
         For a file without times or cells, or with fewer than 20 usable readings.
     """
-    return tuple(examine_recording(item) for item in read_cell_recordings(path, column))
+    found = read_cell_recordings(path, column, sample_rate)
+    return tuple(examine_recording(item) for item in found)
 
 
-def read_cell_recordings(path: str | Path, column: str | None = None) -> tuple[CellRecording, ...]:
+def read_cell_recordings(
+    path: str | Path, column: str | None = None, sample_rate: float | None = None
+) -> tuple[CellRecording, ...]:
     """Read the cells of a file; as :func:`recorded_cell_health`."""
     file = path_of(path)
     if file.suffix.lower() == ".mcap" and (log := _own_log(file)) is not None:
         return tuple(_of_log(log, column))
-    return _of_table(read_table(file), column)
+    return _of_table(read_table(file), column, sample_rate)
 
 
 def _own_log(path: Path) -> Log | None:
@@ -154,8 +162,10 @@ def _of_log(log: Log, wanted: str | None) -> Iterator[CellRecording]:
         yield CellRecording(name, "N", found)
 
 
-def _of_table(table: ColumnTable, wanted: str | None) -> tuple[CellRecording, ...]:
-    guess = guess_columns(table, Answers())
+def _of_table(
+    table: ColumnTable, wanted: str | None, rate: float | None
+) -> tuple[CellRecording, ...]:
+    guess = guess_columns(table, Answers(sample_rate=rate))
     channel = {item.source: item.channel for item in guess.used}
     if wanted is not None:
         column = table.column(wanted)
@@ -171,7 +181,7 @@ def _of_table(table: ColumnTable, wanted: str | None) -> tuple[CellRecording, ..
         message = f"no column is a load cell for certain; name it by --column, one of {known}"
         raise RunError(Fault(message, table.path))
     beside = [item for item in table.columns if channel.get(item.source, "").endswith(_BESIDE)]
-    return tuple(_of_columns(table, clocks, cell, beside) for cell in cells)
+    return tuple(_of_columns(table, clocks, cell, beside, rate) for cell in cells)
 
 
 def _cells(table: ColumnTable, channel: dict[str, str]) -> Iterator[FileColumn]:
@@ -191,14 +201,19 @@ def _cells(table: ColumnTable, channel: dict[str, str]) -> Iterator[FileColumn]:
 
 
 def _of_columns(
-    table: ColumnTable, clocks: Sequence[FileColumn], cell: FileColumn, beside: Sequence[FileColumn]
+    table: ColumnTable,
+    clocks: Sequence[FileColumn],
+    cell: FileColumn,
+    beside: Sequence[FileColumn],
+    rate: float | None,
 ) -> CellRecording:
     """Times and readings of one column in its own unit."""
     alone = replace(table, columns=(*clocks, cell))
-    own = Answers(columns=(read_column(f"tension={cell.number}*1"),))
+    own = Answers(columns=(read_column(f"tension={cell.number}*1"),), sample_rate=rate)
     streams = streams_of(guess_columns(alone, own))
     if not streams.has_time:
-        raise RunError(Fault("has no times, which the rate of a cell needs", table.path))
+        text = "has no times, which the rate of a cell needs: give the rate by --sample-rate"
+        raise RunError(Fault(text, table.path))
     stream = streams.streams[0]
     if faults := streams.faults:
         raise RunError(list(faults))
@@ -224,6 +239,9 @@ def examine_recording(recording: CellRecording) -> CellFindings:
     """Health and findings of a recording; raises RunError for fewer than 20 usable readings."""
     samples = recording.samples
     value = np.where(samples.usable, samples.value, math.nan)
+    limited = at_limit(value, resolution(value))
+    usable, cut_off = samples.usable & ~limited, samples.saturated | limited
+    samples = replace(samples, usable=usable, saturated=cut_off)
     channels = {"tension": Channel(value, recording.unit)}
     inspection = inspect_run(Run(recording.name, samples.time, channels))
     spikes = inspection.outliers.get("tension", np.zeros(len(value), dtype=bool))
@@ -246,13 +264,12 @@ def examine_recording(recording: CellRecording) -> CellFindings:
     remarks = [*_of_spikes(value, spikes, recording.unit), *found.remarks]
     remarks += [text for text in whole.remarks if "creep" in text]
     remarks += lost_readings(health)
-    # The rest of a sentence on the clock concerns derivatives, of which a cell has none.
     remarks += [
-        item.text.partition(":")[0] if item.code == "clock-jitter" else item.text
+        item.text.partition(_CODES[item.code])[0]
         for item in inspection.findings
         if item.code in _CODES
     ]
-    slope, std = _temperature(recording, samples.usable & ~spikes)
+    slope, std = _temperature(recording, usable & ~spikes)
     if abs(slope) > _SIGNIFICANT * std:
         remarks.append(
             f"the reading follows the temperature: {with_std(slope, std, '1')} {recording.unit} "
@@ -288,8 +305,12 @@ def _at(samples: CellSamples, rows: NDArray[np.intp]) -> CellSamples:
     )
 
 
-_CODES = ("saturated", "repeated-values", "gap", "clock-jitter", "quantised", "low-pass")
-"""Findings of a run's inspection that concern a cell alone."""
+_CODES = {
+    **dict.fromkeys(("repeated-values", "gap", "quantised", "low-pass"), "\n"),
+    **{"saturated": "; larger errors", "clock-jitter": ":"},
+}
+"""Findings of a run's inspection that concern a cell, and where their rest begins, which is on
+derivatives or a winch."""
 
 
 def _of_spikes(value: Array, spikes: NDArray[np.bool_], unit: str) -> Iterator[str]:

@@ -27,7 +27,7 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import BenchCells
-    from winchkit.calibration.cell.fit import CellFit
+    from winchkit.calibration.cell.fit import CellFit, FigureOfMerit
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
 
 _AT_REST = 4.0
@@ -64,6 +64,12 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     type=TABLE,
     help="Fit these points instead of measuring.",
 )
+@click.option(
+    "--weight-class",
+    "weight_class",
+    type=click.Choice(["E2", "F1", "F2", "M1", "M2", "M3"]),
+    help="Accuracy class of the weights (OIML R 111), whose tolerance is added to the uncertainty.",
+)
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
 @duration_option("Averaging time per weight.", default="3 s")
 @quantity_option("--settle", of="time", default="2 s", help="Waiting time after a weight is hung.")
@@ -91,6 +97,7 @@ def command(
     cell: str | None,
     bench: str | None,
     points: str | None,
+    weight_class: str | None,
     order: Literal["linear", "quadratic"],
     serial: str | None,
     temperature: str | None,
@@ -108,7 +115,7 @@ def command(
     Points from a file need neither CELL nor a bench.
     """
     from winchkit.calibration.cell.files import calibration_toml, write_text
-    from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.calibration.cell.fit import WEIGHT_CLASSES, fit_cell
     from winchkit.calibration.cell.static_effects import static_effects
     from winchkit.cli.core.quantities import optional
     from winchkit.report.pages.cell_calibration import effect_lines, report_lines
@@ -121,16 +128,18 @@ def command(
     if output is not None:
         check_output(output, (".toml",))
     found = _found(cell, bench, points, serial, guided)
-    fit, needed = fit_cell(found.points, order), static_effects(found.points, found.unit)
+    tolerance = WEIGHT_CLASSES[weight_class] if weight_class else 0.0
+    fit = fit_cell(found.points, order, tolerance)
+    needed = static_effects(found.points, found.unit, found.creep_shape)
     beside = Path(bench or points or "").parent
     target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
-    for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
+    for line in [*report_lines(fit, found.points, found.unit, found.creep), *effect_lines(needed)]:
         click.echo(line, err=is_json())
     if html is not None:
         from winchkit.report.pages.cell_calibration import report_page
 
-        write_page(html, report_page(calibration, fit, needed))
+        write_page(html, report_page(calibration, fit, needed, found.creep))
     if figures is not None:
         from winchkit.report.pages.cell_calibration import cell_figures
 
@@ -142,7 +151,7 @@ def command(
     if is_json():
         echo_json(
             {"schema": 1, "file": str(target), "fit": fit, "points": found.points}
-            | {"diagnosis": needed}
+            | {"diagnosis": needed, "creep": found.creep}
         )
     suggest_next("check", str(target))
 
@@ -157,6 +166,9 @@ class _Measured:
     points: tuple[CalibrationPoint, ...]
     unit: str = "N"
     """Of the readings."""
+    creep_shape: tuple[float, ...] = ()
+    creep: FigureOfMerit | None = None
+    """Of a file of points with times."""
 
 
 def _found(
@@ -229,7 +241,7 @@ def _from_file(name: str, bench: str, points: str) -> _Measured:
     winch, _, role = name.rpartition(".")
     device = device_of(spec, refs_of(spec)[winch, role]).name
     found = read_points(points)
-    return _Measured(name, device, "", found.points, found.unit)
+    return _Measured(name, device, "", found.points, found.unit, found.creep_shape, found.creep)
 
 
 def _from_file_alone(points: str) -> _Measured:
@@ -237,7 +249,8 @@ def _from_file_alone(points: str) -> _Measured:
     from winchkit.calibration.cell.files import read_points
 
     found = read_points(points)
-    return _Measured(f"{Path(points).stem}-calibration", "", "", found.points, found.unit)
+    name = f"{Path(points).stem}-calibration"
+    return _Measured(name, "", "", found.points, found.unit, found.creep_shape, found.creep)
 
 
 def _measure(

@@ -16,6 +16,7 @@ from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.completion import complete_winch
 from winchkit.cli.core.options import TABLE, bench_by_default, bench_file_option, duration_option
 from winchkit.cli.core.output import json_flag, tell
+from winchkit.cli.core.quantity_type import QuantityType
 from winchkit.errors import UsageError, one_line
 from winchkit.quantity_text import with_std
 
@@ -55,6 +56,13 @@ _MEANINGS = {
 @click.option(
     "-c", "--column", metavar="COLUMN", help="Column of the cell in FILE, by its name or number."
 )
+@click.option(
+    "--sample-rate",
+    "rate",
+    metavar="RATE",
+    type=QuantityType("frequency", example="80 Hz"),
+    help="Rate of the rows of a FILE without times, e.g. '80 Hz'.",
+)
 @duration_option("Duration of the readings.", default="10 s")
 @json_flag("Print the result as JSON.")
 @click.pass_context
@@ -64,6 +72,7 @@ def command(
     bench: str | None,
     run: str | None,
     column: str | None,
+    rate: str | None,
     duration: str,
 ) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
@@ -76,10 +85,11 @@ def command(
     if run is not None:
         if bench is not None and context.get_parameter_source("bench") is not _ENVIRONMENT:
             raise click.UsageError("'--run' reads a file, so '--bench' has no place there.")
-        _examine_recording(run, column or cell)
+        _examine_recording(run, column or cell, rate)
         return
-    if column is not None:
-        raise click.UsageError("'--column' is a column of '--run FILE'.")
+    for option, given in (("column", column), ("sample-rate", rate)):
+        if given is not None:
+            raise click.UsageError(f"'--{option}' is of '--run FILE'.")
     if cell is not None and Path(cell).is_file():
         raise UsageError(f"'{cell}' is a file, not a cell of a bench: --run '{cell}' examines it")
     bench = bench_by_default(context, _parameter(context, "bench"), bench)
@@ -117,12 +127,13 @@ def _parameter(context: click.Context, name: str) -> click.Parameter:
     return next(item for item in context.command.params if item.name == name)
 
 
-def _examine_recording(run: str, column: str | None) -> None:
+def _examine_recording(run: str, column: str | None, rate: str | None) -> None:
     """Report on every cell of a file; exit with 1 where its readings are wrong."""
     from winchkit.calibration.cell.health import is_wrong
     from winchkit.calibration.cell.recordings import recorded_cell_health
+    from winchkit.cli.core.quantities import optional
 
-    found = recorded_cell_health(run, column)
+    found = recorded_cell_health(run, column, optional(rate, "frequency"))
     lines = (line for one in found for line in _lines_of_recorded(one, run))
     tell({"run": run, "cells": [dataclasses.asdict(one) for one in found]}, lines)
     if any(one.spikes or is_wrong(one.health) for one in found):

@@ -17,6 +17,8 @@ from winchkit.errors import Fault, FileError, WinchkitError
 
 INTERRUPTED = 130
 """128 + SIGINT (2), the convention of shells."""
+CLOSED = 129
+"""128 + SIGHUP (1)."""
 INTERNAL = 70
 """``EX_SOFTWARE`` of ``sysexits.h``: an error of winchkit itself."""
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -65,6 +67,9 @@ def _failed(error: Exception) -> int:
     """Report what the operating system refused, else a defect of winchkit; gives the exit code."""
     if isinstance(error, OSError):
         place = error.filename if isinstance(error.filename, str) else ""
+        if not place and error.errno == errno.EIO and any(_is_hung_up(fd) for fd in range(3)):
+            _tell("winchkit: the terminal was closed")
+            return CLOSED
         if place or error.errno in _FULL:
             fault = Fault(f"cannot be used: {error.strerror}", place or "standard output")
             _tell(str(FileError(fault)))
@@ -74,6 +79,15 @@ def _failed(error: Exception) -> int:
         f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
     )
     return INTERNAL
+
+
+def _is_hung_up(stream: int) -> bool:
+    """Whether a stream is a terminal that was closed, without a SIGHUP as under ``nohup``."""
+    try:
+        os.get_terminal_size(stream)
+    except OSError as error:
+        return error.errno == errno.EIO
+    return False
 
 
 def _interrupt(error: BaseException) -> BaseException | None:

@@ -117,7 +117,7 @@ def _tell_one(
         write_page(html, answer_page(answer, page_title(declared.name, runs), asked))
     if figures:
         write_figures(figures, answer_figures(answer, asked))
-    _suggest(answer.diagnosis, runs, asked)
+    _suggest(answer.diagnosis, runs, asked, declared)
 
 
 def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:
@@ -130,7 +130,12 @@ def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:
     )
 
 
-def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
+def _suggest(
+    diagnosis: Diagnosis,
+    runs: Sequence[str],
+    asked: Asked,
+    declared: WinchProfile | RobotProfile,
+) -> None:
     """Next command: calibrate a robot, add the first effect, plan runs or write an effect."""
     if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
@@ -143,6 +148,7 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     if unrelated_outputs(diagnosis):
         return
     from winchkit.profile_edit.naming import extended_name
+    from winchkit.schema.profiles.axis import AxisProfile
 
     told = reported(diagnosis).steps
     first = next(iter(told), None)
@@ -155,7 +161,7 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     elif first is not None and len(first.effects) == 1:
         file = extended_name(asked.profile, first.effects[0])
         suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
-    else:
+    elif not isinstance(declared, AxisProfile):
         suggest_with("plan", asked, runs)
 
 

@@ -33,14 +33,16 @@ _ROWS = 11
 _MARKS = {"up": "^", "down": "v"}
 
 
-def report_lines(fit: CellFit, points: Sequence[CalibrationPoint], unit: str = "N") -> list[str]:
+def report_lines(
+    fit: CellFit, points: Sequence[CalibrationPoint], unit: str = "N", creep: Merit | None = None
+) -> list[str]:
     """Coefficients, figures of merit, residuals drawn with characters, warnings."""
     lines = [f"calibration over {fit.span:.5g} N from {len(points)} points:"]
     lines += [
         f"  {name:20}{value:+.6g} ± {std:.2g}"
         for name, value, std in zip(names(unit), fit.coefficients, fit.std, strict=False)
     ]
-    lines += [f"  {name:28}{value}" for name, value in figures(fit)]
+    lines += [f"  {name:28}{value}" for name, value in figures(fit, creep)]
     lines += ["  residuals (true less fitted), ^ going up, v going down:"]
     lines += [f"  {line}" for line in _residual_lines(fit, points)]
     return lines + [f"  ! {warning}" for warning in fit.warnings]
@@ -53,11 +55,13 @@ def effect_lines(needed: StaticDiagnosis) -> list[str]:
         f"  cannot be distinguished from: {', '.join(names) or 'none'}"
         for names in needed.alternatives
     ]
+    sizes = ", ".join(f"{name} {value:.2g} N" for name, value in needed.detectable)
+    found = [f"  smallest error found with 90 % power: {sizes}"] if sizes else []
     if not needed.effects:
-        return [f"effects of the cell: none is needed ({error})", *alike]
+        return [f"effects of the cell: none is needed ({error})", *alike, *found]
     lines = [f"effects of the cell (least BIC; {error}, {needed.after:.3g} N beside them):"]
     lines += [f"  {' '.join(row)}" for row in _effect_rows(needed)]
-    lines += alike
+    lines += [*alike, *found]
     if not math.isnan(needed.p_value):
         lines.append(
             f"  lack of fit: p = {needed.p_value:.2g}; repeatability {needed.repeatability:.3g} N"
@@ -72,15 +76,18 @@ def _effect_rows(needed: StaticDiagnosis) -> list[tuple[str, str, str]]:
     ]
 
 
-def figures(fit: CellFit) -> list[tuple[str, str]]:
+def figures(fit: CellFit, creep: Merit | None = None) -> list[tuple[str, str]]:
     """Names and values of the figures of merit."""
+    crept = "unknown: the readings at one load have no times"
+    if creep is not None and not math.isnan(creep.value):
+        crept = f"{creep.value:.3%} ± {creep.std:.3%} of a change of load, 1 to 30 minutes after it"
     return [
         ("residual std", f"{fit.residual_std:.3g} N ({fit.residual_std / fit.span:.3%} of span)"),
         ("non-linearity", _share(fit.nonlinearity)),
         ("zero return", _share(fit.zero_return)),
         ("hysteresis (reversibility)", _share(fit.hysteresis)),
         ("repeatability", _share(fit.repeatability)),
-        ("creep", "unknown: the points have no times"),
+        ("creep", crept),
     ]
 
 
@@ -114,7 +121,10 @@ _TONES = {"up": "today", "down": "with"}
 
 
 def report_page(
-    calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis | None = None
+    calibration: CellCalibration,
+    fit: CellFit,
+    needed: StaticDiagnosis | None = None,
+    creep: Merit | None = None,
 ) -> str:
     """Page with the load cell, the fit, the residuals and the points."""
     coefficients = [
@@ -136,7 +146,7 @@ def report_page(
             table(
                 "Figures of merit; the span is from the smallest to the largest load.",
                 ("figure", "value"),
-                figures(fit),
+                figures(fit, creep),
             ),
             join(element("p", warning) for warning in fit.warnings),
         ),
@@ -150,8 +160,15 @@ def _effects(needed: StaticDiagnosis | None) -> Markup:
         return Markup("")
     if not needed.effects:
         return element("p", *effect_lines(needed))
-    caption = effect_lines(needed)[0].removesuffix(":")
-    return table(caption, ("effect", "parameter", "value"), _effect_rows(needed), words=2)
+    caption, *lines = effect_lines(needed)
+    others = lines[len(needed.effects) :]
+    head = ("effect", "parameter", "value")
+    return join(
+        [
+            table(caption.removesuffix(":"), head, _effect_rows(needed), words=2),
+            *(element("p", line) for line in others),
+        ]
+    )
 
 
 def _about(calibration: CellCalibration) -> Markup:

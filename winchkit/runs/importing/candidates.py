@@ -279,7 +279,7 @@ def _unread(column: FileColumn) -> list[str]:
     is_numeric = 2 * sum(any(map(str.isdigit, text)) for text in cells) > len(cells)
     if meaning.channel in {IGNORED, CURRENT, "time", DATE} or not is_numeric:
         return []
-    unread = (text for text in cells if number(text, ".") is None)
+    unread = (text for text in cells if None in (number(text, "."), number(text, ",")))
     return [
         f"'{column.source}' is named like {meaning.channel} and is left out: it has cells that are "
         f"no numbers, such as '{next(unread, cells[0])}'"

@@ -13,7 +13,8 @@ from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.long_table import axes_of, by_kind
-from winchkit.runs.importing.table import ColumnTable
+from winchkit.runs.importing.table import ColumnTable, FileColumn
+from winchkit.runs.importing.units.spelling import read_unit
 from winchkit.schema.file_text import file_text
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
@@ -36,6 +37,7 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
                 item.factor,
                 item.offset,
                 item.stored or wraps.get((item.source, item.channel), ""),
+                _written(guess.table, item.source, item.unit),
             )
             for item in guess.used
         )
@@ -43,6 +45,27 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
         if own not in [(log.column, log.sample_rate, log.axis, log.kind) for log in logs]:
             logs.append(MappedLog(title, *own))
     return ImportMapping(name, tuple(logs))
+
+
+def _written(table: ColumnTable, source: str, unit: str) -> str:
+    """Unit in the header of a column, where it is known and another one than ``unit``."""
+    column = table.column(source)
+    text = "" if column is None or column.is_derived else column.unit
+    own, other = read_unit(text), read_unit(unit)
+    if own is None or (
+        other is not None
+        and (own.dimension, own.factor, own.offset) == (other.dimension, other.factor, other.offset)
+    ):
+        return ""
+    return text
+
+
+def _other_unit(item: MappedColumn, column: FileColumn, mapping: ImportMapping) -> str:
+    return (
+        f"column '{column.source}' is in {column.unit}, and the mapping "
+        f"'{mapping.path or mapping.name}' has {item.unit or 'a factor'}: import the file without "
+        f'the mapping, or add written = "{column.unit}" to the column there, if that unit is wrong'
+    )
 
 
 def mapping_id(mapping: ImportMapping) -> str:
@@ -67,6 +90,14 @@ def guess_by(whole: ColumnTable, mapping: ImportMapping) -> Guess:
     for log in _fitting(whole, mapping)[:1]:
         table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole
         found = [(item, table.column(item.source)) for item in log.column]
+        faults = [
+            Fault(_other_unit(item, column, mapping), whole.path)
+            for item, column in found
+            if column is not None
+            and _written(table, item.source, item.unit) not in {"", item.written}
+        ]
+        if faults:
+            raise RunError(faults)
         by_source = {
             column.source: Assignment(
                 column.source,

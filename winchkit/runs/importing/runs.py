@@ -159,9 +159,9 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     recording = RawColumns(streams.path, header, columns, line_of, texts, notes=streams.notes)
     try:
         return assemble(recording)
-    except RunError as error:
+    except RunError:
         if streams.has_time and (advice := _coarse_clock(time)):
-            raise RunError([Fault(advice, streams.path), *error.faults]) from None
+            raise RunError(Fault(advice, streams.path)) from None
         raise
 
 
@@ -169,9 +169,11 @@ def _coarse_clock(time: Array) -> str:
     """Advice for stamps that repeat because their resolution is coarser than the sampling."""
     steps = np.diff(time[np.isfinite(time)])
     repeated = int(np.count_nonzero(steps == 0))
-    if len(steps) < 10 or repeated < 0.05 * len(steps) or np.any(steps < 0):
+    if np.count_nonzero(steps) < 2 or repeated < 0.05 * len(steps) or np.any(steps < 0):
         return ""
-    rate = len(steps) / float(np.sum(steps)) if np.sum(steps) > 0 else float("nan")
+    # From the first change on: the rows before it are fewer than those of a whole step.
+    first, *_, last = np.flatnonzero(steps)
+    rate = (last - first) / float(np.sum(steps[first + 1 : last + 1]))
     return (
         f"{repeated} of {len(steps) + 1} time stamps repeat the one before: the clock is coarser "
         f'than the sampling. --sample-rate "{rate:.4g} Hz" gives equal steps in place of them'

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,7 @@ def guesses_of(
             rate = told.sample_rate or answers.sample_rate
             answers = replace(told, columns=columns, sample_rate=rate)
         guesses.append(guess)
-    if faults:
+    if faults := [*faults, *_given_twice(guesses)]:
         raise RunError(faults)
     if mapping is None:
         guesses = _with_one_motion(guesses, tables, answers)
@@ -161,6 +162,24 @@ def guesses_of(
         text = _CELL_ALONE if _have(guesses, {"tension", "load"}) else NO_ANGLE
         guesses = [replace(guess, notes=(*guess.notes, text)) for guess in guesses]
     return guesses
+
+
+def _given_twice(guesses: Sequence[Guess]) -> Iterator[Fault]:
+    """Faults of files with the numbers of another one: as its repeat they would have no noise."""
+    found: dict[tuple[object, ...], str] = {}
+    for guess in guesses if len(guesses) > 1 else ():
+        table = guess.file if guess.axis else guess.table
+        columns = {column.source: column for column in table.columns}
+        used = [(item, columns[item.source]) for item in guess.used]
+        moving = any((c.known != c.known[:1]).any() for i, c in used if i.channel != "time")
+        content = tuple(
+            (item.channel, item.factor, sha256(c.values.tobytes()).digest(), tuple(c.texts or ()))
+            for item, c in used
+        )
+        if moving and content in found:
+            text = f"has the same numbers as {one_line(found[content])}, and is no repeat of it"
+            yield Fault(f"{text}: give it once", guess.table.path)
+        found.setdefault(content, guess.table.path)
 
 
 def _without_use(

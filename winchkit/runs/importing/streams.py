@@ -125,9 +125,10 @@ def streams_of(guess: Guess) -> Streams:
         else:
             time = time + (first - origin)
         stream = Stream(time, channels, np.arange(count))
+        stream, timeless = _with_times(stream, table.line_of)
         stream, early = _in_order(_forward(stream), table.line_of)
         stream, note = _without_copies(stream)
-        notes += [*early, *note]
+        notes += [*timeless, *early, *note]
         # Numbers that wrap are unwrapped in the order of time, without the rows left out.
         known = {name: _in_si(own, assigned[name]) for name, own in stream.channels.items()}
         stream = replace(stream, channels=_with_quaternion(known, convention))
@@ -229,10 +230,11 @@ def _clock(
         values, absolute = (column.values - _EXCEL_EPOCH) * 86_400.0, True
     else:
         absolute = epoch_unit(column.values) == item.unit
-        known = column.known
+        counted = restored(column.values, item.stored)
+        known = counted[np.isfinite(counted)]
         raw = float(known[0]) if len(known) else 0.0
         # The difference first: nanoseconds since 1970 have no digits left for its fraction.
-        return raw * item.factor + item.offset, (column.values - raw) * item.factor, absolute
+        return raw * item.factor + item.offset, (counted - raw) * item.factor, absolute
     known = values[np.isfinite(values)]
     first = float(known[0]) if len(known) else 0.0
     return first, values - first, absolute
@@ -266,17 +268,29 @@ def _forward(stream: Stream) -> Stream:
     return stream.at(slice(None, None, -1)) if is_backward else stream
 
 
+def _with_times(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
+    """Without a few rows that have no stamp, with a note."""
+    kept = np.isfinite(stream.time)
+    is_few = np.count_nonzero(~kept) <= STILL * len(kept)
+    return _kept(stream, kept, "no time", line_of) if is_few else (stream, [])
+
+
 def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
     """Without a few single rows whose stamps are out of order, with a note."""
-    kept = rows_in_order(stream.time)
+    return _kept(stream, rows_in_order(stream.time), "a time that is out of order", line_of)
+
+
+def _kept(
+    stream: Stream, kept: NDArray[np.bool_], words: str, line_of: Callable[[int], int | None]
+) -> tuple[Stream, list[str]]:
+    """Some of the rows, with a note on the others."""
     wrong = np.flatnonzero(~kept)
     if not len(wrong):
         return stream, []
     lines = [line for row in wrong if (line := line_of(int(stream.rows[row])))]
     where = f" (line {', '.join(map(str, lines))})" if lines else ""
     count = f"{len(wrong)} of {len(stream.time)} rows"
-    note = f"{count}{where} have a time that is out of order and are left out"
-    return stream.at(kept), [note]
+    return stream.at(kept), [f"{count}{where} have {words} and are left out"]
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:

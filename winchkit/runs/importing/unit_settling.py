@@ -19,7 +19,7 @@ from winchkit.runs.importing.assignment import (
     is_whole,
 )
 from winchkit.runs.importing.consistency import CLOCKS
-from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.formats.stamps import epoch_of, epoch_unit, read_stamps
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import ColumnTable, are_whole
 from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE, SpelledUnit
@@ -95,13 +95,17 @@ def _settle_clock(
         if not read_stamps(item.column.texts).has_date and item.base == "time":
             item.reason = "times of day"
         return
-    epoch = epoch_unit(item.column.values)
-    if epoch == EXCEL and unit is None:
-        item.settle(86_400.0, EXCEL, "derived", "days of a spreadsheet")
-    elif unit is not None:
+    epoch = epoch_of(item.column.values)
+    if epoch is not None and unit is None:
+        unit, is_assumed = read_unit(epoch.unit), epoch.is_assumed
+        confidence = "assumed" if is_assumed else "named"
+        item.reason = f"{epoch.unit} since {epoch.name}{' by its numbers' * is_assumed}"
+    if unit is not None:
         item.settle(unit.factor, unit.text, confidence, item.reason)
-    elif epoch is not None:
-        item.settle(CLOCKS[epoch], epoch, "named", f"{epoch} since 1970")
+        if epoch is not None and unit.text == epoch.unit:
+            item.offset = epoch.offset
+    elif epoch_unit(item.column.values) == EXCEL:
+        item.settle(86_400.0, EXCEL, "derived", "days of a spreadsheet")
     else:
         steps = np.diff(item.column.known)
         usual = float(np.median(steps)) if len(steps) else math.nan

@@ -17,7 +17,7 @@ from winchkit.runs import read_run
 from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
-from winchkit.runs.importing.mapping import mapping_of
+from winchkit.runs.importing.mapping import guess_by, mapping_of
 from winchkit.runs.importing.runs import read_mapped, run_of
 from winchkit.runs.importing.stored.numbers import wrap_of
 from winchkit.runs.importing.stored.sign_bits import lost_sign
@@ -201,9 +201,8 @@ def test_motions_and_spikes_are_no_jumps(tmp_path: Path) -> None:
     assert "jumps by" not in output
 
 
-@pytest.mark.parametrize("decimals", [0, 1])
 @pytest.mark.parametrize("kind", ["two's complement", "sign and magnitude"])
-@pytest.mark.parametrize("bits", [16, 32])
+@pytest.mark.parametrize(("bits", "decimals"), [(8, 0), (16, 0), (16, 1), (32, 0), (32, 1)])
 def test_the_sign_of_a_coarse_signal_is_asked_and_restored(
     bits: int, kind: str, decimals: int, tmp_path: Path
 ) -> None:
@@ -233,6 +232,33 @@ def test_per_cent_that_are_all_negative_have_lost_their_sign() -> None:
     values = 65531.0 + np.arange(3)
     assert lost_sign(values.astype(np.float64), is_small=True) is not None
     assert lost_sign(values.astype(np.float64)) is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "modulus", "decimals"),
+    [("ms", 2**16, 0), ("ms", 2**32, 0), ("us", 2**32, 0), ("ms", 2**32 / 1000, 3)],
+)
+def test_a_clock_that_wraps_goes_on(
+    unit: str, modulus: float, decimals: int, tmp_path: Path
+) -> None:
+    """As ``millis()`` of 16 bits, and ``micros()``, which does so every 72 minutes."""
+    counted = TIME * (1e3 if unit == "ms" else 1e6)
+    start = modulus - counted[100] - 0.5
+    stored = np.round(np.mod(counted + start, modulus), decimals)
+    head = f"clock [{unit}]"
+    path = write(tmp_path / "a.csv", {head: stored, "motor_angle [rad]": ANGLE})
+    guess = guess_columns(read_table(path))
+    assert any(f"wraps at {modulus:.12g} (once)" in note for note in guess.notes)
+    again = guess_by(read_table(path), mapping_of("m", [("a", guess)]))
+    for found in (guess, again):
+        time = run_of(streams_of(found), {}).time
+        assert time == pytest.approx(TIME - TIME[0], abs=1e-3 if unit == "ms" else 1e-6)
+
+
+def test_two_levels_of_a_force_are_no_signs_of_a_byte() -> None:
+    values = np.array([2.0, 3.0, 252.0, 253.0])
+    assert lost_sign(values, is_small=True) is not None
+    assert lost_sign(values) is None
 
 
 def test_a_torque_far_beyond_the_rated_one_is_reported(tmp_path: Path) -> None:

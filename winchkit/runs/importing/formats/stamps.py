@@ -31,8 +31,39 @@ _PATTERNS = (
     re.compile(_DAY),
 )
 _NAMED = re.compile(r"[A-Za-z]{3,9}\.?,?\s+")
-_EPOCHS = {"s": (3e8, 4e9), "ms": (3e11, 4e12), "us": (3e14, 4e15), "ns": (3e17, 4e18)}
-"""Numbers of 1979 to 2096 in each unit since 1970; other counters and clocks are smaller."""
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """A way of counting time, by the numbers that only it has."""
+
+    unit: str
+    least: float
+    most: float
+    """Range of the numbers."""
+    name: str = "1970"
+    offset: float = 0.0
+    """Of its zero, s since 1970."""
+    is_assumed: bool = False
+    """Whether numbers in the range may be of another clock."""
+
+
+_EPOCHS = (
+    Epoch("s", 3e8, 3.7e9),
+    Epoch("s", 3.7e9, 4.3e9, "1904 (LabVIEW)", -2_082_844_800.0, is_assumed=True),
+    Epoch("ms", 3e11, 4e12),
+    Epoch("us", 3e14, 4e15),
+    Epoch("100ns", 1.2e17, 1.6e17, "1601 (FILETIME of Windows)", -11_644_473_600.0, True),
+    Epoch("ns", 3e17, 6.2e17),
+    Epoch("100ns", 6.2e17, 6.6e17, "the year 1 (ticks of .NET)", -62_135_596_800.0, True),
+    Epoch("ns", 6.6e17, 4e18),
+)
+"""Numbers of 1979 to 2087 since 1970; 2021 to 2040 since 1904, 1981 to 2108 since 1601, 1965 to
+2092 since the year 1; other counters and clocks are smaller. Nanoseconds of 1989 and 1990 are taken
+as ticks: no logger has both."""
+_DAYS = {EXCEL: (30_000, 60_000), "d": (719_000, 770_000)}
+"""Days since 1899-12-30 (1982 to 2064), and since the year 0 (datenum of MATLAB, 1968 to 2108)."""
+_DATENUM = Epoch("d", *_DAYS["d"], "the year 0 (datenum)", -719_529 * 86_400.0, is_assumed=True)
 
 
 @dataclass(frozen=True)
@@ -80,24 +111,32 @@ def read_stamps(cells: Sequence[str]) -> Stamps:
     return Stamps(values, tuple(wrong), has_date, has_clock)
 
 
-def epoch_unit(values: Array) -> str | None:
-    """Unit in which a column (n,) counts from 1970: ``s``, ``ms``, ``us``, ``ns`` or ``excel``.
+def epoch_of(values: Array) -> Epoch | None:
+    """Epoch from which a column (n,) counts; None for another clock, or days of a spreadsheet.
 
-    Days of a spreadsheet (30000 to 60000, years 1982 to 2064) are recognised where the numbers have
-    fractions finer than 0.1 s.
+    Days are recognised where the numbers have fractions finer than 0.01 days.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):
         return None
     low, high = float(finite.min()), float(finite.max())
-    for unit, (least, most) in _EPOCHS.items():
-        if least <= low and high <= most:
-            return unit
-    steps = np.diff(finite)
-    in_days = low >= 30_000 and high <= 60_000 and high - low < 1.0
-    if in_days and len(steps) and 0 < float(np.median(np.abs(steps))) < 0.01:
-        return EXCEL
-    return None
+    found = next((item for item in _EPOCHS if item.least <= low and high <= item.most), None)
+    return found or (_DATENUM if _are_days(finite, "d") else None)
+
+
+def epoch_unit(values: Array) -> str | None:
+    """Unit in which a column (n,) counts from an epoch: ``s``, ``ms``, ``excel`` and so on."""
+    epoch = epoch_of(values)
+    if epoch is not None:
+        return epoch.unit
+    return EXCEL if _are_days(values[np.isfinite(values)], EXCEL) else None
+
+
+def _are_days(finite: Array, unit: str) -> bool:
+    least, most = _DAYS[unit]
+    steps = np.abs(np.diff(finite))
+    is_fine = len(steps) > 0 and 0 < float(np.median(steps)) < 0.01
+    return is_fine and bool(np.all((least <= finite) & (finite <= most)) and np.ptp(finite) < 1.0)
 
 
 def _match(cell: str) -> re.Match[str] | None:

@@ -28,6 +28,10 @@ from winchkit.schema.mapping import DATE, MODULO
 _TURN = 2 * math.pi
 _TURNS = {360.0: "deg", _TURN: "rad", 1.0: "turn"}
 """Units of an angle by the number at which it wraps."""
+_CLOCKS = (2.0**16, 2.0**32, 2.0**32 / 1000)
+"""Ranges of clocks: of counts, and of microseconds that are written in milliseconds."""
+_GAP = 2.5
+"""Usual steps of a clock, beyond which it may have been set back."""
 _RANGES = tuple(2.0**bits for bits in range(8, 33))
 """Ranges of counters: a byte to a double word."""
 
@@ -36,6 +40,8 @@ def settle_stored(work: Work) -> None:
     """Restore the numbers of every column, before units are compared; ask where it is not sure."""
     given = dict(work.answers.modulo)
     lost: dict[tuple[str, str], list[tuple[ChosenColumn, LostSign]]] = {}
+    for clock in (item for item in work.columns if item.base == "time"):
+        _settle_clock_wrap(work, clock)
     for item in work.columns:
         name = item.column.source
         if item.base in {"time", DATE} or item.column.texts is not None:
@@ -55,6 +61,20 @@ def settle_stored(work: Work) -> None:
                 lost.setdefault((_stem(name), sign.stored), []).append((item, sign))
     for items in lost.values():
         _settle_signs(work, items)
+
+
+def _settle_clock_wrap(work: Work, clock: ChosenColumn) -> None:
+    """Unwrap a clock that counts in a field of 16 or 32 bits, where it goes back by all of it."""
+    steps = np.diff(clock.column.known)
+    back, forward = steps[steps < 0], steps[steps > 0]
+    if clock.column.texts is not None or not len(back) or not len(forward):
+        return
+    name, usual = clock.column.source, float(np.median(forward))
+    for modulus in _CLOCKS:
+        if np.all((back + modulus > 0) & (back + modulus < _GAP * usual)):
+            _restore(clock, f"{MODULO} {modulus:.12g}")
+            times = "once" if len(back) == 1 else f"{len(back)} times"
+            work.notes.append(f"'{name}' is a clock that wraps at {modulus:.12g} ({times})")
 
 
 def _in_order(work: Work, item: ChosenColumn, *, is_whole: bool = True) -> Array:

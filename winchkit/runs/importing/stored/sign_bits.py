@@ -19,6 +19,7 @@ _BITS = range(8, 33)
 """Widths of counters: a byte to a double word."""
 _WORDS = (16, 24, 32)
 """Widths of the fields of a bus, which small values of either sign do not reach by chance."""
+_BYTE = 8
 _DECIMALS = range(7)
 """Decimals that a logger may have given the numbers of a field."""
 _FEWEST = 8
@@ -93,7 +94,9 @@ def _of_whole(known: Array, scale: float, *, is_small: bool) -> LostSign | None:
         if known[-1] >= 2 * half or not len(high):
             continue
         for kind, negative in ((MAGNITUDE, high - half), (TWOS, 2 * half - high[::-1])):
-            is_word = bits in _WORDS and negative[-1] < _TINY * half
+            # A byte is that of a share of both signs; a force may have two levels 250 apart.
+            is_byte = bits == _BYTE and is_small and len(low) > 0
+            is_word = (bits in _WORDS or is_byte) and negative[-1] < _TINY * half
             if is_word and not len(low):
                 is_found = is_small
             elif is_word and low[-1] < _TINY * half:

@@ -87,6 +87,7 @@ _FOREIGN: dict[str, dict[float, str]] = {
         1.0: "sec secs second seconds Sek Sekunde Sekunden seconde secondes segundo segundos",
         1e-3: "msec msecs millisec millisecs millisecond milliseconds Millisekunden",
         1e-6: "usec usecs microsec microsecs microsecond microseconds",
+        1e-7: "100ns",
         1e-9: "ns nsec nanosecond nanoseconds",
         60.0: "minute minutes Minuten",
         3600.0: "hr hrs hour hours Std Stunden",
