@@ -19,7 +19,7 @@ from winchkit.model.stages import PARTS, ROBOT_STAGES, At, Stage
 Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
-    "axis", "ungeared", "whole_turns", "torque", "prediction", "cell",
+    "axis", "ungeared", "half_turn", "torque", "prediction", "cell",
     "payloads",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
@@ -34,7 +34,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "robot": "a robot's profile",
     "axis": "a profile of kind 'axis' that turns, or runs without any force in a cable",
     "ungeared": "a profile of kind 'axis', or a winch without a gearbox",
-    "whole_turns": "a run in which the drum turns once at least",
+    "half_turn": "a run in which the drum turns by half a turn at least",
     "torque": "a motor_torque channel",
     "prediction": "the torque that another model predicts (--predicted)",
     "payloads": "load_mass in every run of the axis, of two sizes at least",

@@ -60,5 +60,7 @@ def test_whole_turns_are_those_of_a_drum(tmp_path: Path, stroke: float) -> None:
 
 
 def test_a_force_in_the_cable_makes_it_a_winch(tmp_path: Path) -> None:
+    assert lacking(tmp_path, "drum-unbalance", 3.0, tension=True)
+    assert lacking(tmp_path, "drum-unbalance", 4.0, tension=True) == []
     (missing,) = lacking(tmp_path, "joint-gravity", 3.0, tension=True)
     assert "without any force in a cable" in missing

@@ -15,6 +15,9 @@ from winchkit.schema.profiles.axis import AxisProfile
 _PERIODS = 2
 """Periods of an order that the motor must turn through; screened."""
 
+_LEAST_TURN = 0.5
+"""Turn from which a sine differs from every straight line by a tenth of it; rule of thumb."""
+
 
 def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
     """Parts and channels that an effect needs and that are absent, in words."""
@@ -30,11 +33,11 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         bool(cable.diameter or cable.dead_length or profile.pulley)
         or profile.reference.cable_length is not None
     )
-    turns_whole = not is_axis and _turns(dataset) >= 1
+    turns = 0.0 if is_axis else _turns(dataset)
     cable_force = any(bool(r.raw.at.tension.any()) for r in recordings)
     payloads = {r.raw.at.payload for r in recordings}
     # Without a cable force a winch's drum that never turns once is what a joint is.
-    is_joint = set(dataset.outputs) == {"motor_torque"} and not cable_force and not turns_whole
+    is_joint = set(dataset.outputs) == {"motor_torque"} and not cable_force and turns < 1
     have = {
         "cable": has_cable,
         "layers": profile.drum.kind in {"spiral", "archimedean"},
@@ -47,7 +50,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "robot": False,
         "axis": (is_axis or is_joint) and not profile.is_linear,
         "ungeared": is_axis or profile.gearbox.ratio == 1,
-        "whole_turns": turns_whole,
+        "half_turn": turns >= _LEAST_TURN and not is_joint,
         "torque": "motor_torque" in dataset.outputs,
         "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
         "payloads": None not in payloads and len(payloads) > 1,

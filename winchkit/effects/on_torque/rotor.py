@@ -95,7 +95,7 @@ DRUM_UNBALANCE = Effect(
     confused_with=("drum-eccentricity", "motor-cogging", "joint-gravity"),
     told_apart="Two loads: the torque by an eccentric drum grows with the load, and its length has "
     "the same period.",
-    needs=("whole_turns",),
+    needs=("half_turn",),
     polar=("amplitude", "phase"),
     order=-2,
 )
