@@ -487,6 +487,22 @@ def test_a_jerk_is_no_spike() -> None:
     assert finding.text.startswith("1 of ")
 
 
+def test_a_corrupted_row_is_no_jerk() -> None:
+    """A position that leaves and returns within two samples makes no peak of a force physical."""
+    random = np.random.default_rng(3)
+    length = 5.0 + np.arange(COUNT) * 1e-3 + random.normal(0, 1e-4, COUNT)
+    force = 98 + random.normal(0, 0.3, COUNT)
+    rows = np.arange(200, COUNT - 200, 150)
+    length[rows] += 0.3
+    force[rows] += 40
+    run = Run("r", np.arange(COUNT) / RATE, {
+        "cable_length": Channel(length, "m"), "tension": Channel(force, "N")
+    })  # fmt: skip
+    texts = [finding.text for finding in found(run, "outliers")]
+    assert len(texts) == 2
+    assert all(text.startswith(f"{len(rows)} ") for text in texts)
+
+
 def _with_velocity(angle: Array, velocity: Array) -> list[str]:
     time = np.arange(len(angle)) / RATE
     channels = {"motor_angle": Channel(angle, "rad"), "motor_velocity": Channel(velocity, "rad/s")}

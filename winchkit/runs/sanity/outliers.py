@@ -61,8 +61,9 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
     time: it is none. Spikes of independent transmission errors coincide too: each with a deviation
     of another channel as often as that channel deviates. Peaks are physical where the spikes of a
     channel coincide with more deviations, counted over the other channels, than that (test of a sum
-    of binomial counts, level 1 %). A first or last row of another moment differs in several
-    channels.
+    of binomial counts, level 1 %). A position cannot leave and return within two samples: its peaks
+    are spikes, and no evidence that others are physical, as its other deviations are. A first or
+    last row of another moment differs in several channels.
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name], resolutions[name]) for name in names}
@@ -74,14 +75,19 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
         if not spikes.any():
             continue
         beside = [
-            shared
-            for other, (_, shared, _) in found.items()
+            shared & ~_within_one(own) if is_position(other) else shared
+            for other, (own, shared, _) in found.items()
             if other != name and other.rpartition(".")[0] in {"", winch}
         ]
-        alone = spikes & ~_physical(spikes, beside)
+        alone = spikes if is_position(name) else spikes & ~_physical(spikes, beside)
         if alone.any():
             out[name] = alone | ends
     return out
+
+
+def is_position(name: str) -> bool:
+    """Whether a channel has the dimension of an angle or a length."""
+    return CHANNEL_DIMENSIONS[name.rpartition(".")[2]] in {"angle", "length"}
 
 
 def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Finding]:
