@@ -129,7 +129,7 @@ const openExample = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
   list.value = "demo-fat-drum";
-  dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
+  dialog("Open an example", el("p", { class: "note" }, "An example simulates two programmes under two loads, each twice, with the effect of its name."),
     el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); closeDialog(); }) }, "Open"),
       el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); closeDialog(); }) }, "Hide the effect")));
 });

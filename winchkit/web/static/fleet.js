@@ -58,7 +58,7 @@ function context() {
 function start() {
   const command = [found.indexed ? null : `winchkit library index ${found.folder}`, found.diagnosed ? null : `winchkit fleet diagnose ${found.folder} -p PROFILE`].filter(Boolean);
   return el("div", { class: "drop" }, el("h1", {}, found.indexed ? "Which winch differs, since when?" : "This folder has no index yet"),
-    el("p", { class: "note" }, command.length ? "The fleet shows tables that these commands write. Effects can also be named above." : "One set of effects is fitted to every session, 0.2 s each; every series is tested for a step and a trend."), command.length ? el("pre", { tabindex: 0 }, command.join("\n")) : null);
+    el("p", { class: "note" }, command.length ? "The fleet shows tables that these commands write. Effects can also be named above." : "Fits one set of effects to every session (0.2 s each), and tests every series for a step and a trend."), command.length ? el("pre", { tabindex: 0 }, command.join("\n")) : null);
 }
 
 function busy() {

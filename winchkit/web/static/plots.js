@@ -30,7 +30,7 @@ function axes(xLabel, logarithmic, flat, left) {
   return [
     { stroke: ink, font: FONT, size: 26, space: (u, axis, low, high, width) => Math.max(flat ? 34 : 64, width / 7), grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
       ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(u, ticks, xLabel, logarithmic ? power : number) },
-    { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+    { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? (u) => Math.max(16, u.height / 6) : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => steps(ticks) },
   ];
 }
