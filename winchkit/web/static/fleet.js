@@ -3,6 +3,7 @@
 import { ask, attempt, dialog, el, fill, number, order, say, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 import { steps } from "./figures.js";
+import { readable } from "./plots.js";
 
 const ROW = 20, DAY = 86400;
 
@@ -156,13 +157,13 @@ function drawSeries() {
     parts.push(svg("path", { d: date === null ? `M${a} ${Y(before)}L${b} ${Y(after)}` : `M${a} ${Y(before)}H${X(date)}V${Y(after)}H${b}`, fill: "none", stroke: "var(--with)", "stroke-width": 2.5 }));
   }
   known.forEach(([t, v, s], i) => {
-    const dot = svg("g", { class: "cell" }, svg("title", {}, `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`), svg("line", { x1: X(t), x2: X(t), y1: Y(v - s), y2: Y(v + s), stroke: "var(--today)" }), svg("circle", { cx: X(t), cy: Y(v), r: i === picked.s ? 6 : 4, fill: i === picked.s ? "var(--today)" : "var(--surface)", stroke: "var(--today)", "stroke-width": 2 }));
+    const dot = svg("g", { class: "cell" }, svg("line", { x1: X(t), x2: X(t), y1: Y(v - s), y2: Y(v + s), stroke: "var(--today)" }), svg("circle", { cx: X(t), cy: Y(v), r: i === picked.s ? 6 : 4, fill: i === picked.s ? "var(--today)" : "var(--surface)", stroke: "var(--today)", "stroke-width": 2 }));
     dot.addEventListener("click", () => choose(picked.p, picked.w, i));
     parts.push(dot);
   });
   parts.push(svg("text", { x: LEFT, y: H - 4, fill: "var(--muted)" }, day(whole[0])), svg("text", { x: W - 4, y: H - 4, "text-anchor": "end", fill: "var(--muted)" }, day(whole[1])));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${H}`, "font-size": 12, role: "img", "aria-label": `Estimates of ${winch.winch} over time` }, parts);
-  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), drawn,
+  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), readable({ node: drawn, marks: known.map(([t, v, s]) => [X(t), Y(v), `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`]) }),
     el("div", { class: "row" }, el("span", { class: "note" }, "± one standard deviation; dashed: common value"), drawingExporter(`${winch.winch}-${own.effect}`.replaceAll("/", "-"), `${winch.winch}: ${title(own)}`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), [["date", winch.times.map(day)], [`value [${own.unit}]`, winch.values], [`std [${own.unit}]`, winch.stds]])),
     winch.texts.map((text) => el("p", { class: "note" }, text)), winch.texts.length ? null : el("p", { class: "note" }, "No change, and no difference from the others."),
     el("div", { class: "buttons" }, el("button", { onclick: behind }, `Runs of ${day(winch.times[picked.s])}`)));

@@ -151,6 +151,19 @@ function readout(box, { xLabel, names, unit, runs, traces }) {
   };
 }
 
+// A drawing with the read-out of the mark that is nearest to the pointer; `marks` are [x, y, words].
+export function readable({ node, marks }) {
+  const shown = el("div", { class: "readout", style: { right: "4px" }, hidden: true });
+  const far = ([x, y], at) => Math.hypot(x - at.x, y - at.y);
+  node.addEventListener("pointermove", (event) => {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(node.getScreenCTM().inverse());
+    shown.hidden = !marks.length;
+    if (marks.length) shown.textContent = marks.reduce((best, mark) => (far(mark, at) < far(best, at) ? mark : best))[2];
+  });
+  node.addEventListener("pointerleave", () => { shown.hidden = true; });
+  return el("div", { class: "plot" }, node, shown);
+}
+
 // One plot; `names` of its series and their `unit` are for the read-out.
 export function plot(host, data, series, { names = [], unit = "", height, xLabel = "", xUnit = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, left = 0, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
