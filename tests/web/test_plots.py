@@ -114,6 +114,8 @@ def test_the_address_has_zoom_comparison_filter_and_channel(browser: Any, served
     assert page.input_value("[aria-label='Filter runs']") == "slow"
     assert page.input_value("[aria-label=Channel]") == "motor_torque"
     assert page.locator("table.library tr:not(.set) input:checked").count() == 1
+    page.evaluate("location.hash = '#library/runs/fast'")
+    until(page, lambda: page.input_value("[aria-label='Filter runs']") == "fast")
     page.goto("about:blank")
     page.goto(f"{served.url}#diagnose/cable_length///0")
     until(page, lambda: page.locator("#ladder-b").count() == 1)

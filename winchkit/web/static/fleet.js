@@ -107,8 +107,9 @@ function drawGrid(own, p) {
       parts.push(svg("line", { x1: a, x2: Math.max(b, a + 1), y1: y + ROW - 1, y2: y + ROW - 1, stroke: "var(--ink)", "stroke-width": 2 }), svg("path", { d: `M${at} ${y + ROW - 1}v-${ROW - 2}l6 4l-6 4z`, fill: "var(--ink)", stroke: "var(--surface)", "stroke-width": 0.75, class: "step" }));
     }
   });
-  const last = narrow ? 1 : 3, marks = Array.from({ length: last + 1 }, (_, i) => whole[0] + ((whole[1] - whole[0]) * i) / last);
-  parts.push(svg("line", { x1: NAME, x2: W - 8, y1: height + 2, y2: height + 2, stroke: "var(--edge)" }), ...(whole[1] > whole[0] ? marks : [whole[0]]).map((t, i) => svg("text", { x: X(t), y: height + 18, "text-anchor": i ? (i === last ? "end" : "middle") : "start", fill: "var(--muted)" }, day(t))));
+  // As many dates as have room.
+  const last = day(whole[0]) === day(whole[1]) ? 0 : Math.min(narrow ? 1 : 3, Math.floor((X(whole[1]) - X(whole[0])) / 110)), marks = Array.from({ length: last + 1 }, (_, i) => whole[0] + (last && ((whole[1] - whole[0]) * i) / last));
+  parts.push(svg("line", { x1: NAME, x2: W - 8, y1: height + 2, y2: height + 2, stroke: "var(--edge)" }), ...marks.map((t, i) => svg("text", { x: X(t), y: height + 18, "text-anchor": i ? (i === last ? "end" : "middle") : "start", fill: "var(--muted)" }, day(t))));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${height + 24}`, "font-size": 12, role: "group", tabindex: 0, "aria-label": `${title(own)}: deviation of every session from the median winch; arrows choose a session`, class: "fleet" }, parts);
   drawn.addEventListener("keydown", (event) => move(event, p));
   const cells = own.winches.flatMap((winch) => winch.times.map((t, s) => [winch.winch, day(t), winch.values[s], winch.stds[s], winch.deviations[s]]));
