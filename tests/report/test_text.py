@@ -33,7 +33,7 @@ from winchkit.diagnosis.results import (
 from winchkit.quantity_text import percent
 from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.waterfall import errors_without
-from winchkit.report.text import addition_text, compare_text, report_text
+from winchkit.report.text import FAILS, addition_text, compare_text, report_text
 from winchkit.report.words.sentence import changes_text, headline
 from winchkit.report.words.steps import lowered_most, step_text
 from winchkit.schema.read import read_profile
@@ -242,11 +242,11 @@ def test_a_comparison_says_first_how_large_the_errors_are_and_where_they_fail() 
     (tension,) = (line.split() for line in lines if line.startswith("  tension  "))
     assert tension == ["tension", "4.00", "N", "0.500", "N", "8.0", "%"]
     assert not any("%" in line for line in lines if line.startswith("  cable length  "))
-    told = lines[lines.index("where it fails") + 1 :]
+    told = lines[lines.index(FAILS) + 1 :]
     assert told == [
-        "  force follows the load 80 %",
-        "  x follows the load 80 %",
-        "  tension follows the load 80 %; mean +3.9 N",
+        "  force: 80 % follows the load",
+        "  x: 80 % follows the load",
+        "  tension: 80 % follows the load; mean +3.9 N",
     ]
 
 
@@ -255,7 +255,7 @@ def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
     lines = compare_text(compare(recorded("demo-elastic-rope"), profile)).splitlines()
     assert len(lines) <= 70
     assert max(map(len, lines)) <= 80
-    assert any(line.startswith("  cable length follows the load") for line in lines)
+    assert any(line.startswith("  cable length: ") and "follows the load" in line for line in lines)
 
 
 def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:

@@ -108,10 +108,14 @@ def test_the_address_has_zoom_comparison_filter_and_channel(browser: Any, served
     page.select_option("[aria-label=Channel]", "motor_torque")
     shown = page.locator("table.library tr").count()
     assert "/slow/" in page.url
+    page.locator("table.library tr:not(.set) input").first.check()
     page.reload()
     until(page, lambda: page.locator("table.library tr").count() == shown)
     assert page.input_value("[aria-label='Filter runs']") == "slow"
     assert page.input_value("[aria-label=Channel]") == "motor_torque"
+    assert page.locator("table.library tr:not(.set) input:checked").count() == 1
+    page.evaluate("location.hash = '#library/runs/fast'")
+    until(page, lambda: page.input_value("[aria-label='Filter runs']") == "fast")
     page.goto("about:blank")
     page.goto(f"{served.url}#diagnose/cable_length///0")
     until(page, lambda: page.locator("#ladder-b").count() == 1)

@@ -133,11 +133,9 @@ def standing_of(
     chances = [p for name in there if (p := outputs[name].p_value) is not None]
     remaining = ""
     if not trusted or left > CERTAIN * explained:
-        remaining = "the error that it leaves is more than a tenth of what it explains"
+        remaining = "it leaves more than a tenth of what it explains: another effect may act too"
     elif left + known_to > CERTAIN * explained:
-        remaining = (
-            "the noise is not known to a tenth of what it explains: it may be another effect"
-        )
+        remaining = "the noise is too uncertain to exclude another effect"
     elif left > _WELL_KNOWN * explained and any(p < _REJECTED for p in chances):
         remaining = "what it leaves is no noise: its law may be another one"
     return Standing(share, remaining, explained)
@@ -164,7 +162,7 @@ def with_standing(
         )
         doubts.append(Doubt("reversal", what))
     if small:
-        what = "another step explains ten times as much there: it may be a deviation of that law"
+        what = "another step explains ten times as much there: this may be an error of its law"
         doubts.append(Doubt("small", what))
     single = len(step.effects) == 1
     established = single and curve is None
@@ -217,9 +215,7 @@ def _doubts(
     largest = COLLINEAR_DELAY if term.effect.is_delay else _LARGEST_COLLINEARITY
     if collinearity(regression, result.final, result.noise, index) > largest:
         within = "a third" if term.effect.is_delay else "0.3 %"
-        what = (
-            f"the others imitate its change to within {within}: their values may cancel each other"
-        )
+        what = f"the others can imitate it to within {within}: their values may cancel each other"
         out.append(Doubt("collinear", what))
     if not result.final.converged:
         steps = result.final.iterations

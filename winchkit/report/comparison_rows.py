@@ -33,7 +33,7 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
 
 def short_rows(comparison: Comparison) -> list[list[str]]:
     """Per output its error and noise, and, but of a length, the share of what the output varies."""
-    rows = [["error, rms", "", "noise", "of what it varies"]]
+    rows = [["error, rms", "", "noise", "of its variation"]]
     for name in worst_outputs(comparison.outputs):
         error = comparison.outputs[name]
         scale = scale_for(error.rms, error.unit)
@@ -45,20 +45,26 @@ def short_rows(comparison: Comparison) -> list[list[str]]:
 
 
 def failing(comparison: Comparison) -> list[str]:
-    """At most three outputs above their noise: what each error follows, and where it is largest."""
+    """At most three outputs above their noise: ``tension: 80 % follows the load; mean +3.9 N; up to
+    +4.2 N at 3 m, 196 N``.
+    """
     drawn = {one.output: one for one in reversed(comparison.maps)}
     lines = []
     for name in worst_outputs(comparison.outputs):
         error = comparison.outputs[name]
         if at_noise(error):
             continue
-        scale, article = scale_for(3 * error.rms, error.unit), "the " if error.follows else ""
-        parts = [f"follows {article}{followed(error, 1)}"]
+        scale = scale_for(3 * error.rms, error.unit)
+        shares = [
+            *(f"{percent(share)} follows the {variable_name(v)}" for v, share in error.follows[:1]),
+            *(f"{percent(s)} has {often_per_turn(a, order)}" for a, order, s in _clear(error)),
+        ]
+        parts = [", ".join(shares) or "no measured variable explains it"]
         if error.bias**2 > _BIASED * error.rms**2:
             parts.append(f"mean {signed(error.bias, scale)}")
         if name in drawn:
             parts.append(largest_text(drawn[name], scale))
-        lines.append(f"{output_name(name)} {'; '.join(parts)}")
+        lines.append(f"{output_name(name)}: {'; '.join(parts)}")
     return lines[:_FAILING]
 
 

@@ -77,6 +77,7 @@ _BARS = 40
 """Characters of a curve; with its scale within 80."""
 _USED = 0.95
 """Share of the samples of an output from which practically all are compared."""
+FAILS = "where it fails (shares of the error's variance)"
 _STEP_LINES = 12
 """Lines of steps in the short text."""
 
@@ -166,7 +167,7 @@ def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
     blocks = [paragraph(f"{comparison_headline(comparison)}.")]
     if comparison.outputs and not verbose:
         lines = entries(failing(comparison))
-        blocks += [aligned(short_rows(comparison)), ["where it fails", *lines] if lines else []]
+        blocks += [aligned(short_rows(comparison)), [FAILS, *lines] if lines else []]
     elif comparison.outputs:
         blocks += _tables(comparison)
     blocks += [*_data(comparison, all_shares=verbose), _notes(comparison.notes)]
@@ -393,7 +394,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
     if isinstance(result, Diagnosis) and unrelated_outputs(result):
         told |= {UNRELATED}
-    findings = finding_texts([f for f in result.sanity if f.code not in told])
+    most = {} if all_shares else {"most": 1}
+    findings = finding_texts([f for f in result.sanity if f.code not in told], **most)
     caveats = [caveat_text(code) for code in result.caveats if code not in told]
     quiet = [band for band in result.removed if all_shares and not band.above_noise]
     findings += [f"{OUTPUT_NAMES[band.output]}: {band.text}" for band in quiet]

@@ -249,9 +249,11 @@ class DiagnoseView:
         path = self._free("next.toml")
         write_programme(found.programme(path.stem), path)
         best = found.offers[0]
-        texts = plan_texts(found, "It")
+        texts = plan_texts(found)
         if best.shows:
-            texts.append(f"It could also show {listed([effect_name(e) for e in best.shows])}.")
+            also = "also " if texts else ""
+            shows = listed([effect_name(e) for e in best.shows])
+            texts.append(f"It {also}shows these effects if they are there: {shows}.")
         runs, profile = self._state.selection()
         return {
             "file": self.named(path),

@@ -51,6 +51,19 @@ def test_check_says_what_a_file_is(programme: Path, run: Path) -> None:
     assert result.stderr == ""
 
 
+def test_a_shipped_declaration_is_checked_by_its_name() -> None:
+    result = invoke("check", "bench-spiral", "demo-fat-drum", "generic-cia402")
+    assert result.exit_code == 0, result.stderr
+    assert "bench-spiral.toml: ok (winch 'bench-spiral')" in result.stdout
+
+
+def test_a_new_profile_without_an_ending_is_no_fault_of_an_option(tmp_path: Path) -> None:
+    result = invoke("profile", "new", tmp_path / "mine")
+    assert result.exit_code == 2
+    assert "a profile is a .toml file; name one" in result.stderr
+    assert "-o " not in result.stderr
+
+
 def test_check_goes_on_after_a_bad_file(programme: Path, run: Path, tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(PROGRAMME.replace('"1 s"', '"1 m"') + 'speed = "1 m/s"\nextra = 1\n')

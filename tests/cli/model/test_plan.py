@@ -73,7 +73,7 @@ def test_where_nothing_is_to_be_distinguished_it_shows_something_new(tmp_path: P
     assert minutes["full stroke, warmed up by 15 K"] > 20
     assert minutes["full stroke"] < 2
     text = invoke("plan", *runs, "-p", "bench-spiral").stdout
-    assert text.startswith("what to run next (nothing to distinguish")
+    assert text.startswith(f"Run next: {best['kind']}, {best['minutes']:.1f} minutes.")
     for offer in told["offers"]:
         assert f"\n  {offer['kind']}  " in text
 

@@ -108,5 +108,5 @@ def test_a_plan_isolates_what_no_effect_explains(cornered: list[Path]) -> None:
     assert found["isolates"]["order"] == 5
     assert found["offers"][0]["kind"] == "speed ladder, both directions"
     text = " ".join(invoke("plan", *cornered, "-p", "bench-spiral").stdout.split())
-    assert "The first is for what no effect explains: " in text
-    assert "It shows whether it grows with the speed" in text
+    assert "It isolates what no effect explains: " in text
+    assert "Where it grows with the speed, the cause is inertia or viscous friction" in text

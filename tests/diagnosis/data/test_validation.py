@@ -158,7 +158,10 @@ def test_another_winch_is_recognised_by_its_length_and_not_by_its_name() -> None
 def test_notes_count_what_is_missing() -> None:
     lost = np.arange(400) % 40 == 39
     few = with_channel(GOOD, "tension", np.where(lost, np.nan, GOOD["tension"]))
-    assert validate_runs([few], GROOVED) == [f"{GOOD.name}: NaN samples not compared: tension 10"]
+    assert validate_runs([few], GROOVED) == ["NaN samples not compared: tension 10"]
+    other = with_channel(made(7), "tension", np.where(lost, np.nan, made(7)["tension"]))
+    both = validate_runs([few, other], GROOVED)
+    assert both == ["NaN samples not compared: tension 20 in 2 runs"]
 
 
 def test_every_output_can_stand_alone() -> None:

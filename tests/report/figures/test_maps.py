@@ -69,7 +69,7 @@ def test_the_largest_cell_is_reported() -> None:
     planted = replace(drawn, mean=mean, share=0.5)
     assert planted.largest == (3, 2)
     text = map_text(planted, PrintScale("mm", 1e-3))
-    assert text.startswith("over free length and load 50 %, most −2.0 mm at ")
+    assert text.startswith("over free length and load 50 %, up to −2.0 mm at ")
 
 
 def test_another_residual_is_drawn_in_the_same_cells() -> None:

@@ -30,5 +30,12 @@ def test_alike_findings_of_many_runs_are_shortened() -> None:
     ]
 
 
+def test_the_short_text_has_one_line_per_kind_of_finding() -> None:
+    assert finding_texts([jitter("a", 50), jitter("b", 20), jitter("c", 30)], most=1) == [
+        "time of a: intervals vary by 50 %",
+        "time of b, c: the same with other numbers, listed by --json",
+    ]
+
+
 def test_an_inverted_sign_says_what_to_do() -> None:
     assert "--column CHANNEL=-COLUMN" in caveat_text("inverted-sign")

@@ -484,7 +484,7 @@ def test_a_jerk_is_no_spike() -> None:
     assert not found(Run("r", time, channels), "outliers")
     force[int(20 * RATE)] += 20
     (finding,) = found(Run("r", time, channels), "outliers")
-    assert finding.text.startswith("1 of ")
+    assert finding.text.startswith("1 spike of 20.0 N")
 
 
 def test_a_corrupted_row_is_no_jerk() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -299,6 +300,10 @@ def test_a_robot_is_calibrated_turned_and_saved(
     until(page, lambda: page.locator("#details svg").count() == 2)
     assert "Pose error falls from" in page.inner_text("h1")
     assert page.locator("#picture svg circle").count() >= 9
+    page.locator("#details svg").nth(1).hover(position={"x": 120, "y": 60})
+    assert re.match(
+        r"cable \d, (before|after) [\d.]+ mm", page.inner_text("#details .readout:visible")
+    )
     until(page, lambda: "margin 0 to" in page.inner_text("#picture"))
     page.focus("#row")
     page.keyboard.press("ArrowRight")

@@ -83,13 +83,12 @@ def _commission(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Commission
     confirm(
         dialogue,
         "safety.emergency_stop",
-        "The emergency stop of EN 60204-1 is within reach and was tried today?",
+        "Is the emergency stop (EN 60204-1) within reach, and was it tried today?",
     )
     confirm(
         dialogue,
         "safety.area",
-        "Is the area clear: no person where a cable, a load or a drum may move, or where a load "
-        "may fall?",
+        "Is everyone clear of the drum, the cable and the load, and of where the load may fall?",
     )
     hashed = hash_of(spec.path)
     steps = {name: _Steps(spec, name, dialogue) for name in spec.winch}
@@ -198,8 +197,8 @@ class _Steps:
 
     def _brake(self, trials: Trials) -> None:
         question = (
-            f"winch {self._name}: it will be enabled at rest. Is the cable unloaded ('unloaded'), "
-            "or does a brake hold the load ('brake'; it is tried now)?"
+            f"winch {self._name}: the drive will be enabled at rest. Type 'unloaded' if no load "
+            "hangs on the cable, or 'brake' if a brake holds it (the brake is tried now):"
         )
         answer = self._dialogue.ask(f"{self._name}.brake", question, ("unloaded", "brake"))
         if answer == "unloaded":
@@ -237,8 +236,8 @@ class _Steps:
                 "when the host dies. Nothing was recorded"
             )
         text = (
-            f"winch {self._name}: the host fell silent with the drive enabled {where}: it went to "
-            f"{seen.state} after {seen.after:.3f} s, cable {_mm(seen.travel)}."
+            f"winch {self._name}: the host fell silent with the drive enabled {where}. The drive "
+            f"went to {seen.state} after {seen.after:.3f} s and the cable moved {_mm(seen.travel)}."
         )
         item = "host loss in motion" if speed else "host loss"
         key = f"{self._name}.{item.replace(' ', '_')}"
@@ -249,8 +248,8 @@ class _Steps:
     def _moving(self, trials: Trials) -> TrialResult | None:
         speed = _slow(self._wiring)
         question = (
-            f"winch {self._name}: try the loss of the host in a slow move, winding in at "
-            f"{speed:g} m/s for 0.8 s ('yes' moves it, 'no' leaves it out)?"
+            f"winch {self._name}: try the loss of the host also in motion? 'yes' winds in at "
+            f"{speed:g} m/s for 0.8 s, 'no' leaves it out."
             f"{trials.room(self._name)}"
         )
         answer = self._dialogue.ask(f"{self._name}.try_in_motion", question, YES_OR_NO)
@@ -303,9 +302,9 @@ class _Steps:
     def _cell(self, motions: Motions) -> None:
         name, before = self._name, motions.tension()
         question = (
-            f"winch {name}: the cell reads {before:.1f} N. Pull on the cable or hang a load on it "
-            "and keep it there, then answer 'pulled'; or answer 'right' where a known load hangs "
-            "now and its tension has this size and sign"
+            f"winch {name}: the cell reads {before:.1f} N. If a known load hangs now and this is "
+            "its tension, answer 'right'. Else pull on the cable, or hang a load on it and leave "
+            "it there, and answer 'pulled'"
         )
         answer = self._dialogue.ask(f"{name}.cell", question, ("pulled", "right"))
         after = motions.tension()

@@ -19,7 +19,8 @@ def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
     target = Path(path)
     if target.suffix.lower() not in suffixes:
         known = " or ".join(suffixes)
-        raise UsageError(f"-o {path}: '{target.suffix}' is no format for it; name a {known} file")
+        what = f"'{target.suffix}' is no format for it" if target.suffix else "it has no ending"
+        raise UsageError(f"-o {path}: {what}; name a {known} file")
     if target.is_dir():
         raise UsageError(f"-o {path}: is a folder; name a file")
     if not target.parent.is_dir():

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import click
 
 from winchkit import wings
 from winchkit.arguments import require_type
+from winchkit.catalog import Kind, find, names
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import TABLE, effects_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
@@ -103,7 +104,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
     Parameters
     ----------
     file : str or Path
-        Declaration (.toml), run (.csv, .mcap), EDS, DCF, XDD or XDC.
+        Declaration (.toml, or the name of a shipped one), run (.csv, .mcap), EDS, DCF, XDD or XDC.
     effects : sequence of str
         Python files with effects of your own that a profile has.
 
@@ -113,7 +114,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         Kind, name, faults and warnings; ``ok`` where the file can be used.
     """
     require_type(file, (str, Path), "file")
-    file = str(file)
+    file = _of_name(str(file))
     suffix = Path(file).suffix.lower()
     try:
         if suffix in RUNS:
@@ -129,6 +130,15 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         return Verdict(file, "", faults=(Fault(message, file),))
     except FileError as error:
         return Verdict(file, "", faults=error.faults)
+
+
+def _of_name(file: str) -> str:
+    """Path of a shipped declaration by its name; without one the text itself."""
+    if not Path(file).exists():
+        for kind in get_args(Kind):
+            if file in names(kind):
+                return str(find(kind, file))
+    return file
 
 
 def _about_computer() -> tuple[str, ...]:

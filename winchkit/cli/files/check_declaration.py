@@ -53,7 +53,10 @@ def report_of(value: object) -> DriveReport:
         instrument = check_process(value)
         return DriveReport(instrument.faults, instrument.warnings)
     report = check_drive(value)
-    ways = ", ".join(f"{one.way} ({one.reaction})" for one in report.host_loss)
+    alike: dict[str, list[str]] = {}
+    for one in report.host_loss:
+        alike.setdefault(one.reaction, []).append(one.way)
+    ways = "; ".join(f"{' or '.join(own)}: {reaction}" for reaction, own in alike.items())
     faults, details = report.faults, [f"loss of the host, by the EDS: {ways or 'no way'}"]
     if value.servo is not None:
         try:

@@ -117,7 +117,8 @@ def _plan_winch(
     texts = plan_texts(found)
     if found.inseparable and limits is None:
         texts.append("With --bench BENCH.toml the plan goes as far as that bench may.")
-    lines = [_text(found), *(line for text in texts for line in paragraph(text))]
+    said = [line for text in texts for line in paragraph(text)]
+    lines = [_text(found), *said] if found.pairs else [_first(found), *said, "", _text(found)]
     tell({**found.to_json(), "programme": path, "chosen": chosen}, lines)
     if path is None:
         words = () if bench is None else ("-b", bench)
@@ -160,6 +161,12 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
     return wired[name].limits
 
 
+def _first(plan: WinchPlan) -> str:
+    """The programme to run, where no effects are to be distinguished."""
+    best = plan.offers[0]
+    return f"Run next: {best.kind.name}, {best.minutes:.1f} minutes."
+
+
 def _text(plan: WinchPlan) -> str:
     """A line a kind, the best first; pairs of effects by letters."""
     from winchkit.quantity_text import percent
@@ -167,9 +174,9 @@ def _text(plan: WinchPlan) -> str:
 
     found, pairs = plan.offers, plan.pairs
     if not pairs:
-        rows = [["programme", "minutes", "could also show"]]
+        rows = [["programme", "minutes", "could show"]]
         rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
-        said = "what to run next (nothing to distinguish: effects that these runs cannot show)"
+        said = "programmes, and the effects that they could show and these runs could not"
         return "\n".join([said, *hanging(rows)])
     letters = ascii_uppercase[: len(pairs)]
     table = [["programme", "minutes", *letters]]

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.early_checks import check_output
+from winchkit.cli.core.early_checks import check_new_profile
 from winchkit.cli.core.lazy import CommandPlace, LazyGroup
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import Decorator, all_of
@@ -86,7 +86,7 @@ def new(*, file: str, pulleys: Sequence[str], replace: bool, **given: str | None
     from winchkit.cli.core.output import echo_json
     from winchkit.profile_edit.new_profile import new_profile
 
-    check_output(file, (".toml",))
+    check_new_profile(file, "FILE.toml")
     values = {field.key: given["_".join(field.place)] or "" for field in FIELDS}
     lacking = any(not field.without and not values[field.key] for field in asked(values))
     if lacking and may_ask():

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.transients import white_noise
 from winchkit.model.line import Motion
-from winchkit.quantity_text import quantity
+from winchkit.quantity_text import percent, quantity
 from winchkit.runs.sanity.finding import Finding
 
 STANDSTILL = "standstill"
@@ -122,9 +122,9 @@ def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> lis
         spread = float(np.sqrt(within))
         share = sum(i.stop - i.start for i in intervals) / len(measured)
         text = (
-            f"changes by {quantity(spread, 'N m')} rms while the motor stands still: static "
-            f"friction holds any torque below its limit; these {share:.0%} of the samples are not "
-            "compared"
+            f"{percent(share)} of the samples left out: the motor stands still, where static "
+            "friction holds any torque below its limit; it changes by "
+            f"{quantity(spread, 'N m')} rms there"
         )
         found.append(Finding(STANDSTILL, name, "motor_torque", spread, text))
     return found

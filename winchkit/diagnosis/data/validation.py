@@ -49,7 +49,7 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
         faults = _alike([fault for run in runs for fault in _other_winch(run, profile)])
     if faults:
         raise RunError(faults)
-    return [note for run in runs for note in _notes(run, profile)]
+    return [*_missing(runs), *(note for run in runs for note in _other_profile(run, profile))]
 
 
 _FACTOR = re.compile(r"^changes by \S+")
@@ -187,16 +187,25 @@ def _slope(predicted: Array, measured: Array) -> float:
     return float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
 
 
-def _notes(run: Run, profile: WinchProfile) -> list[str]:
-    notes = []
-    missing = {name: channel.missing for name, channel in run.channels.items() if channel.missing}
-    if missing:
-        listed = ", ".join(f"{name} {count}" for name, count in missing.items())
-        notes.append(f"{run.name}: NaN samples not compared: {listed}")
+def _missing(runs: Sequence[Run]) -> list[str]:
+    """A note on the samples that are NaN, by channel, with the number of runs; none without any."""
+    counts: dict[str, list[int]] = {}
+    for run in runs:
+        for name, channel in run.channels.items():
+            if channel.missing:
+                counts.setdefault(name, []).append(channel.missing)
+    listed = [
+        f"{name} {sum(own)}" + (f" in {len(own)} runs" if len(own) > 1 else "")
+        for name, own in counts.items()
+    ]
+    return [f"NaN samples not compared: {', '.join(listed)}"] if listed else []
+
+
+def _other_profile(run: Run, profile: WinchProfile) -> list[str]:
     named = run.metadata.get("profile", profile.name)
-    if named != profile.name:
-        notes.append(f"{run.name}: recorded with profile '{named}', compared with '{profile.name}'")
-    return notes
+    if named == profile.name:
+        return []
+    return [f"{run.name}: recorded with profile '{named}', compared with '{profile.name}'"]
 
 
 def with_torques(runs: Sequence[Run], profile: WinchProfile) -> list[Run]:

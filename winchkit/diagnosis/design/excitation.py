@@ -52,8 +52,8 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
         np.ptp(np.concatenate([t for t in temperatures if t is not None])) < LEAST_TEMPERATURE_RANGE
     ):
         notes.append(
-            "temperature nearly constant: a thermal effect looks like an offset or a wrong radius, "
-            "if it shows at all; record one run cold and one warm"
+            "temperature nearly constant: a thermal effect would look like an offset or a wrong "
+            "radius; record one run cold and one warm"
         )
     return notes
 

@@ -62,25 +62,29 @@ _, _LENGTHS, _LADDER, _REVERSALS = (motion.name for motion in _MOTIONS)
 _WARMED = "full stroke, warmed up by 15 K"
 _AT_A_PLACE = (
     _LADDER,
-    "whether it grows with the speed, as that of inertia and viscous friction, or stays, as that "
-    "of the geometry",
+    "Where it grows with the speed, the cause is inertia or viscous friction; where it stays the "
+    "same, the geometry.",
 )
 _AT_A_REVERSAL = (
     _REVERSALS,
-    "whether it needs a distance after each reversal, as presliding and backlash do, or only the "
-    "direction, as Coulomb friction does",
+    "Where it needs a distance after each reversal, the cause is presliding or backlash; where "
+    "only the direction counts, Coulomb friction.",
 )
 _WITH_THE_LOAD = (
     f"{_LENGTHS}, twice the load",
-    "whether it is in proportion to the load, and whether it depends on the length",
+    "It shows whether the error is in proportion to the load, and whether it depends on the "
+    "length.",
 )
-_OVER_TIME = _WARMED, "whether it follows the temperature"
+_OVER_TIME = _WARMED, "It shows whether the error follows the temperature."
 ISOLATING = {
     "drum_angle": _AT_A_PLACE,
     "motor_angle": _AT_A_PLACE,
     "cable_length": _AT_A_PLACE,
     "position": _AT_A_PLACE,
-    "speed": (_LADDER, "from which speed on it is there, and whether both directions are alike"),
+    "speed": (
+        _LADDER,
+        "It shows from which speed on the error is there, and whether both directions are alike.",
+    ),
     "direction": _AT_A_REVERSAL,
     "reversal_distance": _AT_A_REVERSAL,
     "directed_length": _AT_A_REVERSAL,

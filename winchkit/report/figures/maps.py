@@ -17,20 +17,20 @@ from winchkit.report.words.vocabulary import output_name, variable_name
 
 
 def map_text(drawn: ResidualMap, scale: PrintScale) -> str:
-    """``over free length and load 93 %, most +1.2 mm at 3 m, 196 N``."""
+    """``over free length and load 93 %, up to +1.2 mm at 3 m, 196 N``."""
     names = " and ".join(variable_name(name) for name in drawn.over)
     return f"over {names} {percent(drawn.share)}, {largest_text(drawn, scale)}"
 
 
 def largest_text(drawn: ResidualMap, scale: PrintScale) -> str:
-    """``most +1.2 mm at 3 m, 196 N``."""
+    """``up to +1.2 mm at 3 m, 196 N``."""
     across, up = drawn.largest
     mean = float(drawn.mean[across, up])
     places = [
         _place(map_reading(name), float(np.mean(edges[at : at + 2])))
         for name, edges, at in zip(drawn.over, drawn.edges, (across, up), strict=True)
     ]
-    return f"most {signed(mean, scale)} at {', '.join(places)}"
+    return f"up to {signed(mean, scale)} at {', '.join(places)}"
 
 
 def map_reading(variable: str) -> AxisLabel:

@@ -31,18 +31,21 @@ def caveat_text(code: str) -> str:
     return _CAVEATS.get(code, code)
 
 
-def finding_texts(findings: Sequence[Finding]) -> list[str]:
-    """Findings, the most important first; a line per channel and text, with its runs."""
+def finding_texts(findings: Sequence[Finding], most: int = _SHOWN) -> list[str]:
+    """Findings, the most important first; a line per channel and text, with its runs.
+
+    Of more than ``most`` texts that differ in their numbers the first ones are listed.
+    """
     runs: dict[tuple[str, str], dict[str, list[str]]] = {}
     for finding in findings:
         alike = runs.setdefault((finding.channel, finding.code), {})
         alike.setdefault(finding.text, []).append(finding.run)
-    return [line for (channel, _), texts in runs.items() for line in _alike(channel, texts)]
+    return [line for (channel, _), texts in runs.items() for line in _alike(channel, texts, most)]
 
 
-def _alike(channel: str, texts: Mapping[str, list[str]]) -> Iterator[str]:
+def _alike(channel: str, texts: Mapping[str, list[str]], most: int) -> Iterator[str]:
     """Lines of one code: the first, and where they are many, how many more there are."""
-    shown = texts if len(texts) <= _SHOWN else dict(list(texts.items())[: _SHOWN - 1])
+    shown = texts if len(texts) <= most else dict(list(texts.items())[: max(1, most - 1)])
     for text, names in shown.items():
         yield f"{_place(names, channel)}: {text}"
     others = [name for text, names in texts.items() if text not in shown for name in names]

@@ -184,7 +184,8 @@ def changes_text(diagnosis: Diagnosis) -> str:
     if diagnosis.next_runs:
         run = diagnosis.next_runs[0]
         power = "" if isnan(run.power) else f" (power {percent(run.power)})"
-        return f"To decide{_between(run.separates)}: {run.programme.rstrip('.')}{power}."
+        how = run.programme.rstrip(".")
+        return f"To decide{_between(run.separates)}: {how[:1].lower()}{how[1:]}{power}."
     rest = "the rest" if reported(diagnosis).steps else "it"
     return (
         f"To check: record {beyond}. If the new model misses it by more than the noise, this "
@@ -199,15 +200,12 @@ def _between(effects: Sequence[str]) -> str:
     return f" between {listed(list(effects))}" if effects else ""
 
 
-def plan_texts(found: WinchPlan, first: str = "The first") -> list[str]:
+def plan_texts(found: WinchPlan) -> list[str]:
     """What the first programme of a plan is for beside its powers, and what no programme shows."""
     texts, at = [], found.operating_range
     if found.isolates is not None:
         shows = ISOLATING[found.isolates.variable][1]
-        texts.append(
-            f"{first} is for what no effect explains: {where_text(found.isolates)}. It shows "
-            f"{shows}."
-        )
+        texts.append(f"It isolates what no effect explains: {where_text(found.isolates)}. {shows}")
     for one, other in found.inseparable:
         texts.append(
             f"{one.effect.id} / {other.effect.id}: no such motion within {at.low:.2f} m to "

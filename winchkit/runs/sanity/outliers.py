@@ -99,9 +99,13 @@ def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Findi
             run.name,
             name,
             largest,
-            f"{np.count_nonzero(spikes)} of {len(run)} samples are spikes of up to "
-            f"{quantity(largest, run.channels[name].unit)}; they are not compared",
+            f"{_many(int(np.count_nonzero(spikes)))} {quantity(largest, run.channels[name].unit)} "
+            f"left out of {len(run)} samples",
         )
+
+
+def _many(spikes: int) -> str:
+    return "1 spike of" if spikes == 1 else f"{spikes} spikes of up to"
 
 
 def spike_size(values: Array, spikes: NDArray[np.bool_]) -> float:

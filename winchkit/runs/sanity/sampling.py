@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import quantity
 from winchkit.runs.gaps import gap_lengths, lost_samples
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding, counted, share
@@ -32,8 +33,8 @@ def sampling(run: Run) -> Iterator[Finding]:
             run.name,
             "time",
             jitter,
-            f"intervals vary by {share(jitter)} (standard deviation) about {np.mean(even):.3g} s: "
-            "speeds and accelerations are those of a smoothing spline",
+            f"sampled every {quantity(float(np.mean(even)), 's')} with {share(jitter)} of jitter: "
+            "a smoothing spline gives speed and acceleration",
         )
     if len(gaps):
         lost = float(np.sum(gaps - usual))

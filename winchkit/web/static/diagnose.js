@@ -75,9 +75,12 @@ function render() {
   busy();
 }
 
+// A file by its name, without its folder.
+const leaf = (path) => path.split(/[\\/]/).at(-1);
+
 function context() {
   const used = view.runs.filter((run) => run.used), loads = [...new Set(used.map((run) => run.load).filter(Boolean))];
-  const profile = el("button", { onclick: chooseProfile }, el("b", {}, view.profile ? view.profile.name : "choose…"),
+  const profile = el("button", { onclick: chooseProfile, title: view.profile ? view.profile.name : null }, el("b", {}, view.profile ? leaf(view.profile.name) : "choose…"),
     view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.names.join(", ")}`) : null);
   return el("div", { class: "row context of-runs" },
     el("span", { class: "label" }, "Runs"), el("button", { onclick: chooseRuns }, el("b", {}, `${used.length} run${used.length === 1 ? "" : "s"}`), el("span", { class: "note" }, loads.join(", "))),
@@ -106,9 +109,9 @@ function busy() {
 function empty() {
   const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(filesOf(event.target)) });
   const way = (title, words, ...buttons) => el("section", { class: "w4 way" }, el("h2", {}, title), el("p", { class: "note" }, words), el("div", { class: "row" }, buttons));
-  return el("div", { class: "drop" }, el("h1", {}, view.profile ? `Runs to compare with ${view.profile.name}` : "Which effect does the model of your winch lack?"), el("div", { class: "grid" },
+  return el("div", { class: "drop" }, el("h1", {}, view.profile ? `Runs to compare with ${leaf(view.profile.name)}` : "Which effect does the model of your winch lack?"), el("div", { class: "grid" },
     way("Open the demo", "Simulated runs with an effect that the profile lacks: see it found, add it, see the error fall.", el("button", { class: view.profile ? "" : "primary", onclick: () => attempt(() => order("example", { name: DEMO })) }, "Open the demo"), el("button", { onclick: openExample }, "Open an example…")),
-    way("Drop runs", "Recordings of your winch, dropped anywhere on this page: files of winchkit, or of another program (CSV, XLSX, MAT, HDF5 …), whose columns are then shown.", input, el("button", { class: view.profile ? "primary" : "", onclick: () => input.click() }, "Choose files"), el("button", { onclick: () => newProfile() }, "New profile…")),
+    way("Drop runs", "Drop recordings of your winch anywhere on this page: files of winchkit or of another program (CSV, XLSX, MAT, HDF5 …).", input, el("button", { class: view.profile ? "primary" : "", onclick: () => input.click() }, "Choose files"), el("button", { onclick: () => newProfile() }, "New profile…")),
     way("Connect a bench", "Move a winch, record runs, watch the model live.", el("a", { class: "button", href: "#bench" }, "Connect a bench"))));
 }
 
@@ -126,7 +129,7 @@ const openExample = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
   list.value = "demo-fat-drum";
-  dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
+  dialog("Open an example", el("p", { class: "note" }, "An example simulates two programmes under two loads, each twice, with the effect of its name."),
     el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); closeDialog(); }) }, "Open"),
       el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); closeDialog(); }) }, "Hide the effect")));
 });
@@ -297,7 +300,8 @@ function signatureFigure({ name, signature: s }) {
       { name: `mean [${s.unit}]`, x: s.bins, y: s.means, tone: "today", width: 2 }, { name: `signature [${s.unit}]`, x: s.bins, y: s.signature, tone: "with", width: 3 }] }] };
 }
 
-export const add = (effect) => attempt(() => order("add", { effect }));
+// The new verdict and the rails that slide to it are at the top.
+export const add = (effect) => attempt(async () => { await order("add", { effect }); scrollTo({ top: 0 }); });
 
 async function drawTime() {
   const box = root.querySelector("#time"), output = shown.output;

@@ -3,6 +3,7 @@
 import { ask, attempt, dialog, el, fill, number, order, say, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 import { steps } from "./figures.js";
+import { readable } from "./plots.js";
 
 const ROW = 20, DAY = 86400;
 
@@ -58,7 +59,7 @@ function context() {
 function start() {
   const command = [found.indexed ? null : `winchkit library index ${found.folder}`, found.diagnosed ? null : `winchkit fleet diagnose ${found.folder} -p PROFILE`].filter(Boolean);
   return el("div", { class: "drop" }, el("h1", {}, found.indexed ? "Which winch differs, since when?" : "This folder has no index yet"),
-    el("p", { class: "note" }, command.length ? "These commands write the tables that the fleet is made of; effects can also be named above." : "One set of effects is fitted to every session, 0.2 s each; every series is tested for a step and a trend."), command.length ? el("pre", { tabindex: 0 }, command.join("\n")) : null);
+    el("p", { class: "note" }, command.length ? "The fleet shows tables that these commands write. Effects can also be named above." : "Fits one set of effects to every session (0.2 s each), and tests every series for a step and a trend."), command.length ? el("pre", { tabindex: 0 }, command.join("\n")) : null);
 }
 
 function busy() {
@@ -106,8 +107,9 @@ function drawGrid(own, p) {
       parts.push(svg("line", { x1: a, x2: Math.max(b, a + 1), y1: y + ROW - 1, y2: y + ROW - 1, stroke: "var(--ink)", "stroke-width": 2 }), svg("path", { d: `M${at} ${y + ROW - 1}v-${ROW - 2}l6 4l-6 4z`, fill: "var(--ink)", stroke: "var(--surface)", "stroke-width": 0.75, class: "step" }));
     }
   });
-  const last = narrow ? 1 : 3, marks = Array.from({ length: last + 1 }, (_, i) => whole[0] + ((whole[1] - whole[0]) * i) / last);
-  parts.push(svg("line", { x1: NAME, x2: W - 8, y1: height + 2, y2: height + 2, stroke: "var(--edge)" }), ...(whole[1] > whole[0] ? marks : [whole[0]]).map((t, i) => svg("text", { x: X(t), y: height + 18, "text-anchor": i ? (i === last ? "end" : "middle") : "start", fill: "var(--muted)" }, day(t))));
+  // As many dates as have room.
+  const last = day(whole[0]) === day(whole[1]) ? 0 : Math.min(narrow ? 1 : 3, Math.floor((X(whole[1]) - X(whole[0])) / 110)), marks = Array.from({ length: last + 1 }, (_, i) => whole[0] + (last && ((whole[1] - whole[0]) * i) / last));
+  parts.push(svg("line", { x1: NAME, x2: W - 8, y1: height + 2, y2: height + 2, stroke: "var(--edge)" }), ...marks.map((t, i) => svg("text", { x: X(t), y: height + 18, "text-anchor": i ? (i === last ? "end" : "middle") : "start", fill: "var(--muted)" }, day(t))));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${height + 24}`, "font-size": 12, role: "group", tabindex: 0, "aria-label": `${title(own)}: deviation of every session from the median winch; arrows choose a session`, class: "fleet" }, parts);
   drawn.addEventListener("keydown", (event) => move(event, p));
   const cells = own.winches.flatMap((winch) => winch.times.map((t, s) => [winch.winch, day(t), winch.values[s], winch.stds[s], winch.deviations[s]]));
@@ -156,13 +158,13 @@ function drawSeries() {
     parts.push(svg("path", { d: date === null ? `M${a} ${Y(before)}L${b} ${Y(after)}` : `M${a} ${Y(before)}H${X(date)}V${Y(after)}H${b}`, fill: "none", stroke: "var(--with)", "stroke-width": 2.5 }));
   }
   known.forEach(([t, v, s], i) => {
-    const dot = svg("g", { class: "cell" }, svg("title", {}, `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`), svg("line", { x1: X(t), x2: X(t), y1: Y(v - s), y2: Y(v + s), stroke: "var(--today)" }), svg("circle", { cx: X(t), cy: Y(v), r: i === picked.s ? 6 : 4, fill: i === picked.s ? "var(--today)" : "var(--surface)", stroke: "var(--today)", "stroke-width": 2 }));
+    const dot = svg("g", { class: "cell" }, svg("line", { x1: X(t), x2: X(t), y1: Y(v - s), y2: Y(v + s), stroke: "var(--today)" }), svg("circle", { cx: X(t), cy: Y(v), r: i === picked.s ? 6 : 4, fill: i === picked.s ? "var(--today)" : "var(--surface)", stroke: "var(--today)", "stroke-width": 2 }));
     dot.addEventListener("click", () => choose(picked.p, picked.w, i));
     parts.push(dot);
   });
   parts.push(svg("text", { x: LEFT, y: H - 4, fill: "var(--muted)" }, day(whole[0])), svg("text", { x: W - 4, y: H - 4, "text-anchor": "end", fill: "var(--muted)" }, day(whole[1])));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${H}`, "font-size": 12, role: "img", "aria-label": `Estimates of ${winch.winch} over time` }, parts);
-  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), drawn,
+  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), readable({ node: drawn, marks: known.map(([t, v, s]) => [X(t), Y(v), `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`]) }),
     el("div", { class: "row" }, el("span", { class: "note" }, "± one standard deviation; dashed: common value"), drawingExporter(`${winch.winch}-${own.effect}`.replaceAll("/", "-"), `${winch.winch}: ${title(own)}`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), [["date", winch.times.map(day)], [`value [${own.unit}]`, winch.values], [`std [${own.unit}]`, winch.stds]])),
     winch.texts.map((text) => el("p", { class: "note" }, text)), winch.texts.length ? null : el("p", { class: "note" }, "No change, and no difference from the others."),
     el("div", { class: "buttons" }, el("button", { onclick: behind }, `Runs of ${day(winch.times[picked.s])}`)));

@@ -14,7 +14,7 @@ export const presentName = (profile) => (profile && profile.added.length ? `+ ${
 
 export function counted({ rows, candidates }) {
   const shown = rows.filter((row) => row.kind === "candidate").length;
-  return shown ? `${shown} of ${candidates} candidates shown; the others have less evidence or lower no error` : "";
+  return shown ? `${shown} of ${candidates} candidates shown; the others explain less, or nothing` : "";
 }
 
 // `output` has the focus, `effect` is chosen; `only` draws no other column; `most` is the reach;

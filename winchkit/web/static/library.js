@@ -12,15 +12,17 @@ let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new S
 export function enter(main, fresh) { root = main; state = fresh; root.removeAttribute("data-signature"); load(); }
 export function update(fresh) { const before = state; state = fresh; if (part === "fleet") fleet.update(fresh, before); }
 export function restore(parts) {
-  const [kind, words, judgement, shown, across] = parts.map(decodeURIComponent);
-  part = kind === "fleet" ? "fleet" : "runs"; filter = words || ""; verdict = judgement || ""; channel = shown || channel; over = across || TIME;
+  const [kind, words, judgement, shown, across, ...names] = parts.map(decodeURIComponent);
+  part = kind === "fleet" ? "fleet" : "runs"; filter = words || ""; verdict = judgement || ""; channel = shown || channel; over = across || TIME; chosen = new Set(names);
 }
-// The address: runs or fleet, the filter, the verdict, the channel that is laid over, and its x axis.
-function address() { history.replaceState(null, "", `${location.pathname}${location.search}#library/${part === "fleet" ? "fleet" : ["runs", filter, verdict, channel, ...(over === TIME ? [] : [over])].map(encodeURIComponent).join("/")}`); }
+// The address: runs or fleet, the filter, the verdict, the channel that is laid over, its x axis, and the runs where all of them are drawn.
+function address() { history.replaceState(null, "", `${location.pathname}${location.search}#library/${part === "fleet" ? "fleet" : ["runs", filter, verdict, channel, ...(over === TIME && !named().length ? [] : [over]), ...named()].map(encodeURIComponent).join("/")}`); }
+
+const named = () => (chosen.size <= MOST_LINES ? [...chosen] : []);
 
 async function load() {
   fill(root, el("div", { class: "row context" }, el("span", { class: "label" }, "Reading the folder")));
-  await attempt(async () => { found = await ask("/api/runs"); render(); });
+  await attempt(async () => { found = await ask("/api/runs"); for (const name of chosen) if (!found.runs.some((run) => run.name === name)) chosen.delete(name); render(); });
 }
 
 function show(next) { part = next; address(); render(); }
@@ -42,7 +44,7 @@ function render() {
     el("span", { class: "row end" }, el("button", { class: "primary", id: "open", disabled: !chosen.size, onclick: () => attempt(async () => { await order("library", { names: [...chosen] }); location.hash = "#diagnose"; }) }, openWords()))),
   el("div", { class: "grid" }, el("section", { class: "panel w8 scroll", "aria-label": "Runs" },
     el("table", { class: "rows library" }, el("thead", {}, el("tr", {}, ["", "Set, run", "Programme", "Load", "Duration", "Error ÷ noise", "Verdict"].map((text, i) => el("th", { class: i === 4 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body),
-    outputs.length ? el("div", { class: "legend below" }, outputs.map((name) => el("span", {}, svg("svg", { width: 14, height: 12, "aria-hidden": "true" }, mark(name, 7, 6)), NAMES[name] || name)), el("span", {}, "line on the left: noise floor")) : el("p", { class: "note below" }, "A verdict is shown for runs that were diagnosed: on this page, or by winchkit fleet diagnose.")),
+    outputs.length ? el("div", { class: "legend below" }, outputs.map((name) => el("span", {}, svg("svg", { width: 14, height: 12, "aria-hidden": "true" }, mark(name, 7, 6)), NAMES[name] || name)), el("span", {}, "line on the left: noise floor")) : el("p", { class: "note below" }, "Diagnose runs to see their verdict here.")),
   el("section", { class: "panel w4 beside", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), channels.length ? el("span", { class: "row end" }, pick) : null), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs of the list.")))));
   overlay();
 }
@@ -79,7 +81,7 @@ const faultsRow = (faults) => el("tr", {}, el("td", {}), el("td", { colspan: 6 }
 
 const faultRow = (run) => el("tr", {}, el("td", {}), el("td", {}, run.name), el("td", { colspan: 5, class: "note" }, run.fault));
 
-function redraw() { fill(root.querySelector("table.library tbody"), ...rows()); const button = document.getElementById("open"); button.disabled = !chosen.size; fill(button, openWords()); overlay(); }
+function redraw() { address(); fill(root.querySelector("table.library tbody"), ...rows()); const button = document.getElementById("open"); button.disabled = !chosen.size; fill(button, openWords()); overlay(); }
 
 function setRow(key, runs, open) {
   const [first] = runs, alike = runs.every((run) => JSON.stringify(run.verdict) === JSON.stringify(first.verdict)), whole = runs.every((run) => chosen.has(run.name));

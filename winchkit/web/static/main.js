@@ -15,7 +15,7 @@ function route() {
   if (!state) return;
   // Without a view in the address a page with a bench and no runs shows the bench.
   const next = views[wanted] ? wanted : state.bench && !state.runs.length ? "bench" : "diagnose";
-  if (next === name) return;
+  if (next === name && !parts.length) return; // a link within the view says what it shows
   if (name && views[name].leave) views[name].leave();
   alarm("", "order");
   name = next;

@@ -30,7 +30,7 @@ function axes(xLabel, logarithmic, flat, left) {
   return [
     { stroke: ink, font: FONT, size: 26, space: (u, axis, low, high, width) => Math.max(flat ? 34 : 64, width / 7), grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
       ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(u, ticks, xLabel, logarithmic ? power : number) },
-    { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+    { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? (u) => Math.max(16, u.height / 6) : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => steps(ticks) },
   ];
 }
@@ -149,6 +149,19 @@ function readout(box, { xLabel, names, unit, runs, traces }) {
     box.textContent = [`${number(x, 5)} ${xLabel}`, ...values.filter(([, value, shown]) => shown && value !== null && value !== undefined).map(([name, value]) => `${name} ${number(value, 5)} ${unit}`), run ? run.name : ""].filter(Boolean).join(" · ");
     box.style.cssText = left < u.over.clientWidth / 2 ? "right: 10px" : `left: ${u.over.offsetLeft + 4}px`;
   };
+}
+
+// A drawing with the read-out of the mark that is nearest to the pointer; `marks` are [x, y, words].
+export function readable({ node, marks }) {
+  const shown = el("div", { class: "readout", style: { right: "4px" }, hidden: true });
+  const far = ([x, y], at) => Math.hypot(x - at.x, y - at.y);
+  node.addEventListener("pointermove", (event) => {
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(node.getScreenCTM().inverse());
+    shown.hidden = !marks.length;
+    if (marks.length) shown.textContent = marks.reduce((best, mark) => (far(mark, at) < far(best, at) ? mark : best))[2];
+  });
+  node.addEventListener("pointerleave", () => { shown.hidden = true; });
+  return el("div", { class: "plot" }, node, shown);
 }
 
 // One plot; `names` of its series and their `unit` are for the read-out.

@@ -18,7 +18,7 @@ export function choose(start) {
       preview(name);
     }) });
     dialog("Programme", el("div", { class: "row", style: { marginBottom: "12px" } }, list, file, el("button", { onclick: () => file.click() }, "Choose a file…"), el("label", { class: "label" }, "Runs into ", folder)), shown);
-    if (programmes.length) preview(programmes[0]); else fill(shown, el("p", {}, "There is no programme beside this page's work: choose a file."));
+    if (programmes.length) preview(programmes[0]); else fill(shown, el("p", {}, "There is no programme in the folder of this page. Choose a file."));
 
     // Plans may be answered in another order than they were asked for; the last one counts.
     async function preview(name) {

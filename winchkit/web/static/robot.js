@@ -1,6 +1,7 @@
 // The Robot view: cables and platform, feasible poses, errors before and after the calibration.
 import { alarm, ask, attempt, dialog, download, el, filesOf, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
+import { readable } from "./plots.js";
 
 let bench = null, drawnAt = 0, root = null, view = null, now = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
 
@@ -148,18 +149,19 @@ function logarithmic(rows, { width, height, left, mark = null, label }) {
   const values = rows.flatMap((row) => [row[1], row[2]]).concat(mark ?? []).filter((v) => v > 0).map((v) => v * 1e3);
   const low = Math.floor(Math.log10(Math.min(...values)) * 2) / 2 - 0.1, high = Math.ceil(Math.log10(Math.max(...values)) * 2) / 2 + 0.1;
   const x = (value) => left + ((Math.log10(value * 1e3) - low) / (high - low)) * (width - left - 24), bottom = height - 22;
-  const out = svg("svg", { viewBox: `0 0 ${width} ${height}`, width: "100%", role: "img", "aria-label": label, "font-size": 12 });
+  const out = svg("svg", { viewBox: `0 0 ${width} ${height}`, width: "100%", role: "img", "aria-label": label, "font-size": 12 }), marks = [];
   const powers = []; for (let p = Math.ceil(low); p <= high; p++) powers.push(p);
   powers.forEach((p, i) => out.append(svg("path", { d: `M${x(10 ** (p - 3))} 12V${bottom}`, stroke: "var(--line)" }), svg("text", { x: x(10 ** (p - 3)), y: height - 6, "text-anchor": "middle", fill: "var(--muted)" }, `${number(10 ** p)}${i === powers.length - 1 ? " mm" : ""}`)));
   if (mark) out.append(svg("path", { d: `M${x(mark)} 4V${bottom}`, stroke: "var(--muted)", "stroke-dasharray": "3 3" }), svg("text", { x: x(mark) + 5, y: 12, fill: "var(--muted)" }, `instrument ${mm(mark)}`));
   rows.forEach(([name, before, after], i) => {
     const y = rows.length === 1 ? bottom - 16 : 18 + (i * (bottom - 30)) / Math.max(1, rows.length - 1);
+    for (const [words, value] of [["before", before], ["after", after]]) if (value > 0) marks.push([x(value), y, `${name ? `cable ${name}, ` : ""}${words} ${mm(value)}`]);
     if (name) out.append(svg("text", { x: 0, y: y + 4, fill: "var(--ink2)" }, name));
     if (before > 0 && after > 0) out.append(svg("path", { d: `M${x(before)} ${y}H${x(after)}`, stroke: rows.length === 1 ? "var(--with)" : "var(--edge)", "stroke-width": rows.length === 1 ? 3 : 1 }));
     if (before > 0) out.append(svg("circle", { cx: x(before), cy: y, r: rows.length === 1 ? 6 : 4.5, fill: "var(--today)" }));
     if (after > 0) { const r = rows.length === 1 ? 6 : 4; out.append(svg("rect", { x: x(after) - r, y: y - r, width: 2 * r, height: 2 * r, fill: "var(--with)" })); }
   });
-  return out;
+  return { node: out, marks };
 }
 
 const narrow = () => innerWidth < 700;
@@ -167,7 +169,7 @@ const legend = (before, after) => el("span", { class: "legend" }, el("span", {},
 
 function error(found) {
   const drawn = logarithmic([["", found.before, found.after]], { width: narrow() ? 330 : 470, height: 84, left: 8, mark: found.instrument, label: `Pose error before ${mm(found.before)}, after ${mm(found.after)}` });
-  return el("section", { class: "panel", "aria-label": "Pose error, held out" }, el("header", {}, el("h2", {}, "Pose error, held out"), legend(`before ${mm(found.before)}`, `after ${mm(found.after)}`), drawingExporter("pose-error", "Pose error, held out", drawn, source, [["before [m]", [found.before]], ["after [m]", [found.after]], ["instrument [m]", [found.instrument]]])), drawn);
+  return el("section", { class: "panel", "aria-label": "Pose error, held out" }, el("header", {}, el("h2", {}, "Pose error, held out"), legend(`before ${mm(found.before)}`, `after ${mm(found.after)}`), drawingExporter("pose-error", "Pose error, held out", drawn.node, source, [["before [m]", [found.before]], ["after [m]", [found.after]], ["instrument [m]", [found.instrument]]])), readable(drawn));
 }
 
 const source = () => sourceOf(`robot ${view.name}`, view.files.join(", "));
@@ -177,8 +179,8 @@ function drawDetails(found) {
   const cables = logarithmic(rows, { width: narrow() ? 330 : 230, height: 270, left: 26, label: "Residual of each cable's length before and after" });
   const columns = (values, word) => ["x", "y", "z"].map((axis, i) => [`${word} ${axis} [m]`, values.map((row) => row[i])]);
   fill(box, el("div", { class: "halves" },
-    el("div", {}, el("header", {}, el("h2", {}, "Error vectors, top view"), arrows && drawingExporter("error-vectors", "Error vectors, top view", arrows.node, source, [...columns(found.arrows.at, "measured"), ...columns(found.arrows.before, "error before"), ...columns(found.arrows.after, "error after")])), el("p", { class: "note" }, arrows ? `mm; before × ${arrows.factor}, after: points` : "No position was held out."), arrows && arrows.node),
-    el("div", {}, el("header", {}, el("h2", {}, "Residual per cable"), drawingExporter("cable-residuals", "Residual per cable", cables, source, [["cable", view.lines], ["before [m]", found.cables.before], ["after [m]", found.cables.after]])), el("p", { class: "note" }, "length, rms of the fitted poses"), cables)),
+    el("div", {}, el("header", {}, el("h2", {}, "Error vectors, top view"), arrows && drawingExporter("error-vectors", "Error vectors, top view", arrows.node, source, [...columns(found.arrows.at, "measured"), ...columns(found.arrows.before, "error before"), ...columns(found.arrows.after, "error after")])), el("p", { class: "note" }, arrows ? `mm; before × ${arrows.factor}, after: points` : "No position was held out."), arrows && readable(arrows)),
+    el("div", {}, el("header", {}, el("h2", {}, "Residual per cable"), drawingExporter("cable-residuals", "Residual per cable", cables.node, source, [["cable", view.lines], ["before [m]", found.cables.before], ["after [m]", found.cables.after]])), el("p", { class: "note" }, "length, rms of the fitted poses"), readable(cables))),
     el("h2", { style: { margin: "12px 0 4px" } }, "Largest parameter changes"),
     el("table", {}, el("thead", { class: "visually-hidden" }, el("tr", {}, ["Parameter", "Change", "From, to"].map((t) => el("th", {}, t)))), el("tbody", {}, found.changes.slice(0, 3).map(([name, change, values]) => el("tr", {}, el("td", {}, name), el("td", { class: "number" }, el("b", {}, change)), el("td", { class: "number note" }, values))))));
 }
@@ -197,7 +199,8 @@ function vectors({ at, before, after }) {
   for (let t = Math.ceil(x0 * 1e3 / step) * step; t < (x0 + whole) * 1e3; t += step) node.append(svg("text", { x: px(t / 1e3), y: h - 6, "text-anchor": "middle", fill: "var(--muted)" }, number(t)));
   at.forEach((p, i) => node.append(svg("path", { d: `M${px(p[0])} ${py(p[1])}L${px(p[0] + factor * before[i][0])} ${py(p[1] + factor * before[i][1])}`, stroke: "var(--today)", "stroke-width": 1.2, fill: "none", "marker-end": "url(#tip)" })));
   at.forEach((p, i) => node.append(svg("circle", { cx: px(p[0] + after[i][0]), cy: py(p[1] + after[i][1]), r: 2.2, fill: "var(--with)" })));
-  return { node, factor };
+  const length = (v) => mm(Math.hypot(v[0], v[1]));
+  return { node, factor, marks: at.map((p, i) => [px(p[0]), py(p[1]), `x ${mm(p[0])}, y ${mm(p[1])}: before ${length(before[i])}, after ${length(after[i])}`]) };
 }
 
 function warnings(found) {

@@ -72,7 +72,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       own.setData(next, false);
       own.setScale("x", { min: span[0], max: span[1] });
       const values = next[1].filter((v, i) => v !== null && next[0][i] >= span[0] && next[0][i] <= span[1]), away = top.filter((v) => v !== null && (!values.length || v > Math.max(...values) || v < Math.min(...values)));
-      beyond.textContent = away.length ? `limit${away.length > 1 ? "s lie" : " lies"} outside this plot: ${away.map((v) => number(v, 3)).join(" and ")}` : "";
+      beyond.textContent = away.length ? `limit${away.length > 1 ? "s lie" : " lies"} outside this plot: ${away.map((v) => `${number(v, 3)} ${CHANNELS[names[0]].unit.split(",")[0]}`).join(" and ")}` : "";
       fill(last, names.map((name, i) => { const v = next[1 + i].filter((x) => x !== null).at(-1); return el("b", { style: { color: CHANNELS[name].style[0] === "ink" ? null : `var(--${CHANNELS[name].style[0]})` } }, v === undefined ? "–" : `${v.toFixed(CHANNELS[name].digits).replace("-", "−")} `); }), CHANNELS[names[0]].unit.split(",")[0]);
     });
   }

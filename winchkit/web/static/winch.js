@@ -64,7 +64,7 @@ export function picture(name, own, state, drum, tripped) {
   for (const limit of limits) parts.push(text(narrow ? 458 : gx + 48, y(limit) + 4, `limit ${number(limit, 3)}`, { fill: "var(--ink2)", "text-anchor": narrow ? "end" : "start" }));
   parts.push(svg("path", { d: `M${gx - 12} ${at - 6}l9 6l-9 6z`, fill: "var(--ink)" }), svg("line", { x1: gx - 3, x2: gx + 14, y1: at, y2: at, stroke: "var(--ink)", "stroke-width": 2 }));
   parts.push(svg("path", { d: `M20 450v-5m0 2.5h${0.1 * scale}m0 -2.5v5`, stroke: "var(--ink2)", fill: "none" }), text(28 + 0.1 * scale, 452, narrow ? "100 mm at drum and pulleys" : "100 mm, drum and pulleys; distances schematic"));
-  return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${lengthOf(state)}, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
+  return svg("svg", { viewBox: "0 26 460 434", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${lengthOf(state)}, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
 }
 
 // Cable length in words.

@@ -196,11 +196,11 @@ def _host_loss(dictionary: Any) -> Iterator[HostLossObjects]:
     if timers:
         records = tuple(f"{_RPDO + number - 1:04X}h:5" for number in timers[:1])
         yield HostLossObjects(
-            "rpdo-timeout", records, "EMCY 8250h; what else it does is to be proved"
+            "rpdo-timeout", records, "EMCY 8250h; commissioning shows what else it does"
         )
     cyclic = any(MODES[mode].cyclic for mode in _modes(dictionary))
     if cyclic and writable(dictionary, 0x1006):
-        yield HostLossObjects("sync-loss", ("1006h",), "what it does is to be proved")
+        yield HostLossObjects("sync-loss", ("1006h",), "commissioning shows what it does")
 
 
 def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
@@ -214,10 +214,10 @@ def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
         return f"it reacts as fixed in 6007h: {lost.default} ({words})", ("6007h",)
     if declared(dictionary, 0x1029, 1) is not None:
         return (
-            "it leaves the state operational (1029h:1), there is no 6007h: whether the motor "
-            "stops then is to be proved"
+            "it leaves the state operational (1029h:1), and there is no 6007h: commissioning shows "
+            "whether the motor stops then"
         ), ("1029h:1",)
-    return "neither 6007h nor 1029h: what it does is to be proved", ()
+    return "neither 6007h nor 1029h: commissioning shows what it does", ()
 
 
 def _modes(dictionary: Any) -> Iterator[str]:
