@@ -60,26 +60,28 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
     A peak of the force that lasts one sample, as at a jerk, appears in several channels at the same
     time: it is none. Spikes of independent transmission errors coincide too: each with a deviation
     of another channel as often as that channel deviates. Peaks are physical where the spikes of a
-    channel coincide with more deviations, counted over the other channels, than that (test of a sum
-    of binomial counts, level 1 %). A position cannot leave and return within two samples: its peaks
-    are spikes, and no evidence that others are physical, as its other deviations are. A first or
-    last row of another moment differs in several channels.
+    channel coincide with more deviations, counted over the other channels, than as many rows drawn
+    at random (level 1 %): at a jerk, several channels deviate together. A position cannot leave and
+    return within two samples: its peaks are spikes, and no evidence that others are physical, as
+    its other deviations are. A first or last row of another moment differs in several channels.
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name], resolutions[name]) for name in names}
     out = {}
     for name, (spikes, _, ends) in found.items():
-        winch = name.rpartition(".")[0]
         if ends.any():
             out[name] = ends
         if not spikes.any():
             continue
-        beside = [
-            shared & ~_within_one(own) if is_position(other) else shared
-            for other, (own, shared, _) in found.items()
-            if other != name and other.rpartition(".")[0] in {"", winch}
-        ]
-        alone = spikes if is_position(name) else spikes & ~_physical(spikes, beside)
+        winch = name.rpartition(".")[0]
+        others = {
+            n: f for n, f in found.items() if n != name and n.rpartition(".")[0] in {"", winch}
+        }
+        corrupt = {n: _within_one(own) for n, (own, _, _) in others.items() if is_position(n)}
+        none = np.zeros_like(spikes)
+        beside = [shared & ~corrupt.get(n, none) for n, (_, shared, _) in others.items()]
+        physical = _physical(spikes, beside) & ~np.any([none, *corrupt.values()], axis=0)
+        alone = spikes & (is_position(name) | ~physical)
         if alone.any():
             out[name] = alone | ends
     return out
@@ -197,28 +199,19 @@ def _median_of_four(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 def _physical(spikes: NDArray[np.bool_], beside: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
     """Spikes at which other channels deviate; none where that is chance."""
-    elsewhere = [_within_one(mask) for mask in beside]
-    together = [spikes & mask for mask in elsewhere]
-    count = sum(int(np.count_nonzero(mask)) for mask in together)
-    shares = [float(np.mean(mask)) for mask in elsewhere]
-    if not count or _chance(count, int(np.count_nonzero(spikes)), shares) >= _LEVEL:
+    deviating = sum(map(_within_one, beside), np.zeros(len(spikes), dtype=int))
+    count, trials = int(np.sum(deviating[spikes])), int(np.count_nonzero(spikes))
+    shares = np.bincount(deviating) / len(spikes)
+    if not count or _chance(count, trials, shares) >= _LEVEL:
         return np.zeros_like(spikes)
-    return np.asarray(np.any(np.stack(together), axis=0))
+    return np.asarray(spikes & (deviating > 0))
 
 
-def _chance(count: int, trials: int, shares: Sequence[float]) -> float:
-    """Probability that at least ``count`` of as many trials with each of these chances succeed.
-
-    References
-    ----------
-    Hong, On computing the distribution function for the Poisson binomial distribution, 2013.
-    """
-    length = trials * len(shares) + 1
-    roots = np.exp(2j * np.pi * np.arange(length) / length)
-    transform = np.ones(length, dtype=complex)
-    for share in shares:
-        transform *= (1 - share + share * roots) ** trials
-    return float(np.fft.fft(transform).real[count:].sum() / length)
+def _chance(count: int, trials: int, shares: Array) -> float:
+    """Probability of a sum of at least ``count`` in ``trials`` draws, a k having ``shares[k]``."""
+    length = trials * (len(shares) - 1) + 1
+    transform = np.fft.fft(shares, max(length, len(shares))) ** trials
+    return float(np.fft.ifft(transform).real[count:].sum())
 
 
 def _within_one(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
