@@ -9,8 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.conditioning import (
+    CANCELLED,
+    change_by,
+    ranges_of_changes,
+    value_range,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.effect import Effect
@@ -21,11 +26,6 @@ from winchkit.quantity_text import quantity
 _LARGEST_RATIO = 2.0
 """Range of an effect's change over that of the output itself, from which other effects must cancel
 it; rule of thumb: a balancer cancels most of a weight."""
-_CANCELLED = 5.0
-"""The same over the range of the change by all effects together, as which most of it is cancelled;
-a gain and a share of the torque that imitated a five-cornered drum had 5.4."""
-_ENDS = 0.01, 0.99
-"""Quantiles that are a range: single samples are none."""
 _LEAST_TRAVEL = 0.5
 """Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
 (h²/6 for half a range h): any smooth law fits there."""
@@ -42,21 +42,16 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
     """Whether an effect changes an output by far more than that varies, in words."""
     if not isinstance(regression, TimeSeriesRegression):
         return None
-    change = _change_by(regression, fit, index)
-    together = regression.change(fit.hypothesis)
     for output in regression.outputs:
         unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
-        own, sum_of_all = (
-            _range(regression.compared_samples(each, output)) for each in (change, together)
-        )
+        own, together = ranges_of_changes(regression, fit, index, output)
         samples = regression.measured_samples(output)
-        whole = _range(np.concatenate([values[valid] for values, valid in samples]))
+        whole = value_range(np.concatenate([values[valid] for values, valid in samples]))
         changes = f"it changes the {name} by {quantity(own, unit)}, "
         if own > _LARGEST_RATIO * whole:
-            varies = quantity(whole, unit)
-            return f"{changes}which varies by {varies}: other effects cancel it"
-        if own > _CANCELLED * sum_of_all > 0.0:
-            rest = quantity(sum_of_all, unit)
+            return f"{changes}which varies by {quantity(whole, unit)}: other effects cancel it"
+        if own > CANCELLED * together > 0.0:
+            rest = quantity(together, unit)
             return f"{changes}and all effects together by {rest}: most of it is cancelled"
     return None
 
@@ -131,21 +126,10 @@ def asymmetric_friction(regression: Regression, fit: Fit, index: int) -> str | N
     rows = regression.rows_of(outputs_of(own))
 
     def size_of(place: int) -> float:
-        change = _change_by(regression, fit, place)
+        change = change_by(regression, fit, place)
         return float(np.linalg.norm(np.concatenate([change[one] for one in rows])))
 
     if size_of(index) > sum(map(size_of, frictions)):
         return None
     name = terms[frictions[0]].effect.id
     return f"{name} that differs between the directions by as much would make the same"
-
-
-def _change_by(regression: Regression, fit: Fit, index: int) -> Array:
-    """Change of the prediction by one effect of a fit, (n_rows,)."""
-    hypothesis = fit.hypothesis
-    return regression.change(hypothesis) - regression.change(hypothesis.without(index))
-
-
-def _range(values: Array) -> float:
-    low, high = np.quantile(values, _ENDS)
-    return float(high - low)
