@@ -26,7 +26,7 @@ def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
         assert rungs[0] == output.heldout_rms_before
         assert rungs[-1] == output.heldout_rms_after
     assert len(ladder["rungs"]) == 1 + len(answer.diagnosis.steps)
-    assert len(ladder["first"]) == len(ladder["last"]) == 2
+    assert len(ladder["first"]) == len(ladder["last"]) == len(answer.diagnosis.steps)
 
 
 @pytest.mark.parametrize("bench", ["demo-adequate", UNKNOWN])

@@ -127,7 +127,7 @@ def test_the_unit_of_a_row_counts_before_that_of_a_name(tmp_path: Path) -> None:
     assert (found["time"].factor, found["position"].factor) == (1e-3, 1e-3)
 
 
-STRANGERS = {
+OF_OTHERS = {
     # Dynamometers of a planetary gearbox, of motors, and of a joint.
     "# Test started\n# limit = 25.0 A\ntime [s],velocity setpoint [Hz],velocity measured [Hz],"
     "motor torque measured [Nm],load cell weight [g],brake torque [Nm]\n": {
@@ -153,13 +153,13 @@ STRANGERS = {
     },
     "in s,C2 in V\n": {},
 }
-"""Heads as strangers have them, and the right columns; none is taken for another channel."""
+"""Heads as other labs have them, and the right columns; none is taken for another channel."""
 
 
-@pytest.mark.parametrize("head", STRANGERS)
-def test_columns_of_strangers(head: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", OF_OTHERS)
+def test_columns_of_other_labs(head: str, tmp_path: Path) -> None:
     names = head.splitlines()[-2 if head.endswith(("(kN)\n", "rad.s\n")) else -1]
     delimiter = ";" if ";" in names else ","
     table = rows(*names.split(delimiter)[1:]).replace(",", delimiter)
     found = used(tmp_path / "log.csv", head + table)
-    assert {c: i.source for c, i in found.items() if c != "time"} == STRANGERS[head]
+    assert {c: i.source for c, i in found.items() if c != "time"} == OF_OTHERS[head]

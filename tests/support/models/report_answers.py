@@ -74,7 +74,9 @@ def recorded(bench: str) -> tuple[Run, ...]:
     """Runs of the demo's programme on a shipped simulated bench."""
     declared = read_simbench(find("sim", bench))
     programme = read_programme(programme_path("programme-demo"))
-    return tuple(simulate(declared, profiles_of(declared), programme, seed=3, rate=25.0))
+    # Five corners of a drum at 25 Hz are also an order of the motor that is above the band.
+    rate = 50.0 if bench == "five-cornered-drum" else 25.0
+    return tuple(simulate(declared, profiles_of(declared), programme, seed=3, rate=rate))
 
 
 @cache

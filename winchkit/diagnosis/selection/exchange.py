@@ -7,9 +7,11 @@ from itertools import combinations
 
 import numpy as np
 
+from winchkit.diagnosis.regression.conditioning import CANCELLED, ranges_of_changes
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
 from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN
 from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.scores import Score
@@ -109,6 +111,19 @@ def _better(
         goal = present.chi_square
         with_first = engine.trial(base, first, noise, aim=goal).fit
         trial = engine.trial(with_first, second, noise, target=goal)
-        if trial.criterion < engine.criterion(present) - MIN_GAIN:
+        if trial.criterion < engine.criterion(present) - MIN_GAIN and not cancels(
+            engine, trial.fit
+        ):
             return trial.fit
     return None
+
+
+def cancels(engine: SelectionEngine, pair: Fit) -> bool:
+    """Whether the second effect of a pair is cancelled but for a fifth: what is left is no law of
+    either.
+    """
+    regression, last = engine.regression, len(pair.hypothesis.terms) - 1
+    if not isinstance(regression, TimeSeriesRegression):
+        return False
+    ranges = (ranges_of_changes(regression, pair, last, output) for output in regression.outputs)
+    return any(own > CANCELLED * together for own, together in ranges)

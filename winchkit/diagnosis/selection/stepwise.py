@@ -19,20 +19,14 @@ from itertools import dropwhile
 
 import numpy as np
 
-from winchkit.diagnosis.regression.conditioning import (
-    CANCELLED,
-    COLLINEAR_DELAY,
-    collinearity,
-    ranges_of_changes,
-)
+from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
 from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import BandNoise
-from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import best_accepted, is_accepted
 from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
-from winchkit.diagnosis.selection.exchange import pair_exchange
+from winchkit.diagnosis.selection.exchange import cancels, pair_exchange
 from winchkit.diagnosis.selection.scores import Score, null_maxima
 
 _SHORT_LIST = 5
@@ -250,19 +244,8 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: BandNoise) -> Fit |
         first, second = pair.scores
         with_first = engine.trial(present, first, noise, aim=present.chi_square - pair.explained_ss)
         trials.append(engine.trial(with_first.fit, second, noise))
-    trials = [trial for trial in trials if not _cancels(engine, trial.fit)]
+    trials = [trial for trial in trials if not cancels(engine, trial.fit)]
     return best_accepted(engine, present, noise, trials)
-
-
-def _cancels(engine: SelectionEngine, pair: Fit) -> bool:
-    """Whether the second effect of a pair is cancelled but for a fifth: what is left is no law of
-    either.
-    """
-    regression, last = engine.regression, len(pair.hypothesis.terms) - 1
-    if not isinstance(regression, TimeSeriesRegression):
-        return False
-    ranges = (ranges_of_changes(regression, pair, last, output) for output in regression.outputs)
-    return any(own > CANCELLED * together for own, together in ranges)
 
 
 def _acts_on_unexplained_output(engine: SelectionEngine, present: Fit, noise: BandNoise) -> bool:

@@ -127,8 +127,9 @@ def equivalence_set(
             engine, judged, losses, dispersed
         )
         member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
-        nested = own.effect.nested_with(member.term.effect)
-        joins = not worse and not (nested and _adds_nothing(member, members[0]))
+        # A wave of any order is also every law with a period: its order is a number more.
+        wider = own.effect.nested_with(member.term.effect) or has_orders(member.term.effect)
+        joins = not worse and not (wider and _adds_nothing(member, members[0]))
         if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(member)
         else:
