@@ -61,10 +61,11 @@ def test_a_recording_given_twice_is_no_repeat(tmp_path: Path, join: tuple[str, .
     one = write(tmp_path / "one.csv", head, TIME, ANGLE, np.cos(TIME))
     copy = write(tmp_path / "copy.csv", head, TIME, ANGLE, np.cos(TIME))
     repeat = write(tmp_path / "repeat.csv", head, TIME, ANGLE + 0.01, np.cos(TIME))
-    for other in (one, copy):
+    same = f"has the same numbers as {one}, and is no repeat of it"
+    for other, why in ((one, "is named twice"), (copy, same)):
         code, output = command(one, other, "-o", tmp_path / "runs", *join)
         assert code == 3
-        assert f"has the same numbers as {one}, and is no repeat of it: give it once" in output
+        assert f"{other}: {why}: give it once" in output
         assert not (tmp_path / "runs").exists()
     code, output = command(one, repeat, "-o", tmp_path / "runs", *join)
     assert code == 0, output

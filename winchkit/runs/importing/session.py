@@ -177,8 +177,9 @@ def _given_twice(guesses: Sequence[Guess]) -> Iterator[Fault]:
             for item, c in used
         )
         if moving and content in found:
-            text = f"has the same numbers as {one_line(found[content])}, and is no repeat of it"
-            yield Fault(f"{text}: give it once", guess.table.path)
+            path, other = guess.table.path, found[content]
+            text = f"has the same numbers as {one_line(other)}, and is no repeat of it"
+            yield Fault(f"{'is named twice' if path == other else text}: give it once", path)
         found.setdefault(content, guess.table.path)
 
 
