@@ -42,9 +42,8 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
     """Whether an effect changes an output by far more than that varies, in words."""
     if not isinstance(regression, TimeSeriesRegression):
         return None
-    for output in regression.outputs:
+    for output, (own, together) in ranges_of_changes(regression, fit, index).items():
         unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
-        own, together = ranges_of_changes(regression, fit, index, output)
         samples = regression.measured_samples(output)
         whole = value_range(np.concatenate([values[valid] for values, valid in samples]))
         changes = f"it changes the {name} by {quantity(own, unit)}, "

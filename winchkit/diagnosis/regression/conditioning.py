@@ -70,10 +70,8 @@ def value_covariance(regression: Regression, fit: Fit, noise: BandNoise) -> Valu
 def collinearity(regression: Regression, fit: Fit, noise: BandNoise, index: int) -> float:
     """Squared length of an effect's change over that of the part which the others cannot imitate:
     its variance inflation factor, 1 where it is orthogonal to the others' derivatives."""
-    hypothesis = fit.hypothesis
-    change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
-    change *= noise.inverse_sigma(regression)
-    others = ~regression.unknowns_of(index, hypothesis)
+    change = change_by(regression, fit, index) * noise.inverse_sigma(regression)
+    others = ~regression.unknowns_of(index, fit.hypothesis)
     basis = orthonormal(whitened_jacobian(regression, fit, noise)[:, others])
     left = change - basis @ (basis.T @ change)
     size = float(left @ left)
@@ -121,14 +119,18 @@ def change_by(regression: Regression, fit: Fit, index: int) -> Array:
 
 
 def ranges_of_changes(
-    regression: TimeSeriesRegression, fit: Fit, index: int, output: str
-) -> tuple[float, float]:
-    """Range of the change of an output by one effect, and by all effects together, SI."""
-    own, together = (
-        value_range(regression.compared_samples(change, output))
-        for change in (change_by(regression, fit, index), regression.change(fit.hypothesis))
-    )
-    return own, together
+    regression: TimeSeriesRegression, fit: Fit, index: int
+) -> dict[str, tuple[float, float]]:
+    """Range of the change of each output by one effect, and by all effects together, SI."""
+    together = regression.change(fit.hypothesis)
+    own = together - regression.change(fit.hypothesis.without(index))
+    return {
+        output: (
+            value_range(regression.compared_samples(own, output)),
+            value_range(regression.compared_samples(together, output)),
+        )
+        for output in regression.outputs
+    }
 
 
 def value_range(values: Array) -> float:

@@ -125,5 +125,5 @@ def cancels(engine: SelectionEngine, pair: Fit) -> bool:
     regression, last = engine.regression, len(pair.hypothesis.terms) - 1
     if not isinstance(regression, TimeSeriesRegression):
         return False
-    ranges = (ranges_of_changes(regression, pair, last, output) for output in regression.outputs)
-    return any(own > CANCELLED * together for own, together in ranges)
+    ranges = ranges_of_changes(regression, pair, last)
+    return any(own > CANCELLED * together for own, together in ranges.values())
