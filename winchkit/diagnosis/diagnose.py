@@ -62,9 +62,14 @@ from winchkit.diagnosis.verdict.decision import (
     remaining_share,
     verdict_of,
 )
-from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.equivalence import (
+    EquivalenceSet,
+    equivalence_set,
+    pairs_of,
+    with_first_members,
+)
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.laws import with_first_members, with_simpler_law
+from winchkit.diagnosis.verdict.laws import with_simpler_law
 from winchkit.diagnosis.verdict.open_law import (
     open_law,
     predictable_share,

@@ -3,7 +3,8 @@
 Each rival is refitted in the place of the named effect, under the larger of the noise and of what
 the named model leaves unexplained (quasi-likelihood). It joins the set unless it is worse in
 sample, Δχ² being above the square of a quantile of t (9 for well-known variances), and held out,
-the difference over blocks of time being significant by random signs at 5 %.
+the difference over blocks of time being significant by random signs at 5 %. A law that is a simpler
+one (:mod:`~winchkit.diagnosis.verdict.laws`) is no rival: the simpler law is.
 
 References
 ----------
@@ -29,10 +30,12 @@ from winchkit.diagnosis.regression.dispersion import (
 )
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import RivalPlace
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Projected
+from winchkit.diagnosis.verdict.laws import is_degenerate, largest_rise
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -129,7 +132,11 @@ def equivalence_set(
         member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
         # A wave of any order is also every law with a period: its order is a number more.
         wider = own.effect.nested_with(member.term.effect) or has_orders(member.term.effect)
-        joins = not worse and not (wider and _adds_nothing(member, members[0]))
+        joins = (
+            not worse
+            and not (wider and _adds_nothing(member, members[0]))
+            and not is_degenerate(engine, fitted, dispersed, len(fitted.hypothesis.terms) - 1)
+        )
         if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(member)
         else:
@@ -301,6 +308,24 @@ def _cosine(inner: Array, a: slice, b: slice) -> float:
         roots.append(vectors[:, kept] / np.sqrt(values[kept]))
     across = roots[0].T @ inner[a, b] @ roots[1]
     return float(np.linalg.svd(across, compute_uv=False)[0]) if across.size else 0.0
+
+
+def with_first_members(
+    engine: SelectionEngine, final: Fit, noise: BandNoise, sets: Sequence[EquivalenceSet]
+) -> tuple[Fit, list[EquivalenceSet]]:
+    """The model of the first members of all sets, refitted together, and the sets beside it; the
+    given model where it predicts an output worse by more than 2 %.
+    """
+    hypothesis, first = final.hypothesis, engine.n_initial_terms
+    for index, each in enumerate(sets, start=first):
+        if each.effects[0] != hypothesis.terms[index].effect.id:
+            hypothesis = hypothesis.exchanged(index, each.terms[0], engine.regression.n_runs)
+    own = [term.effect.id for term in final.hypothesis.terms[first:]]
+    if hypothesis is not final.hypothesis:
+        together = engine.refit(hypothesis, noise)
+        if largest_rise(engine, together, final, noise) <= 1 / RELEVANT_RATIO:
+            final, own = together, [each.effects[0] for each in sets]
+    return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]
 
 
 def pairs_of(sets: Sequence[EquivalenceSet]) -> list[tuple[Term, Term]]:

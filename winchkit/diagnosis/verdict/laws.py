@@ -8,7 +8,7 @@ step is left out where the model without it does.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.starting_values import shape_at_bound
-from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible_value, plausible_range
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
@@ -58,9 +57,9 @@ def _with_simpler_laws(
         if not term.effect.reduces_to:
             continue
         simpler = settled(with_simpler_law(engine, present, noise, index))
-        is_as_good = _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
+        is_as_good = largest_rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
         if (is_as_good and transfers(engine, simpler, present, noise)) or (
-            _is_degenerate(engine, present, noise, index)
+            is_degenerate(engine, present, noise, index)
             and _lost_share(engine, simpler, present, noise, index) <= CERTAIN
         ):
             present = simpler
@@ -70,14 +69,13 @@ def _with_simpler_laws(
 def degenerate_laws(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> set[str]:
     """Ids of the additions whose shape is at a bound, implausible, or not determined."""
     terms = list(enumerate(fitted.hypothesis.terms))[engine.n_initial_terms :]
-    return {
-        term.effect.id
-        for index, term in terms
-        if term.effect.reduces_to and _is_degenerate(engine, fitted, noise, index)
-    }
+    return {term.effect.id for index, term in terms if is_degenerate(engine, fitted, noise, index)}
 
 
-def _is_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise, index: int) -> bool:
+def is_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise, index: int) -> bool:
+    """Whether a law that contains simpler ones is one of these (:func:`reduced_law`)."""
+    if not fitted.hypothesis.terms[index].effect.reduces_to:
+        return False
     spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
     term, values = estimates(engine.regression, fitted, spread)[index]
     return reduced_law(term, values, engine.profile)
@@ -96,7 +94,7 @@ def _lost_share(
     return (left - now) / (whole - now) if whole > now else 0.0
 
 
-def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> float:
+def largest_rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandNoise) -> float:
     """Largest ratio of the held-out errors of a smaller model to those of the present one."""
     folds = engine.folds(present, noise)
     now = held_out_rms(engine.regression, present, noise, folds)
@@ -160,26 +158,8 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: BandNoise) -
     best: tuple[float, Fit] | None = None
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         without = engine.refit(present.hypothesis.without(index), noise)
-        rise = _rise(engine, without, present, noise)
+        rise = largest_rise(engine, without, present, noise)
         is_needless = rise <= 1 / RELEVANT_RATIO and not _is_missed(engine, without, present, noise)
         if is_needless and (best is None or rise < best[0]):
             best = rise, without
     return None if best is None else best[1]
-
-
-def with_first_members(
-    engine: SelectionEngine, final: Fit, noise: BandNoise, sets: Sequence[EquivalenceSet]
-) -> tuple[Fit, list[EquivalenceSet]]:
-    """The model of the first members of all sets, refitted together, and the sets beside it; the
-    given model where it predicts an output worse by more than 2 %.
-    """
-    hypothesis, first = final.hypothesis, engine.n_initial_terms
-    for index, each in enumerate(sets, start=first):
-        if each.effects[0] != hypothesis.terms[index].effect.id:
-            hypothesis = hypothesis.exchanged(index, each.terms[0], engine.regression.n_runs)
-    own = [term.effect.id for term in final.hypothesis.terms[first:]]
-    if hypothesis is not final.hypothesis:
-        together = engine.refit(hypothesis, noise)
-        if _rise(engine, together, final, noise) <= 1 / RELEVANT_RATIO:
-            final, own = together, [each.effects[0] for each in sets]
-    return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]

@@ -46,9 +46,14 @@ from winchkit.diagnosis.steps import (
     with_standing,
 )
 from winchkit.diagnosis.verdict.decision import remaining_share, verdict_of
-from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.equivalence import (
+    EquivalenceSet,
+    equivalence_set,
+    pairs_of,
+    with_first_members,
+)
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.laws import simplified, with_first_members
+from winchkit.diagnosis.verdict.laws import simplified
 from winchkit.diagnosis.verdict.profile_values import refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
