@@ -79,6 +79,18 @@ def test_a_wrapped_angle_is_unwrapped_and_reported(
     assert np.array_equal(again["motor_angle"], angle)
 
 
+@pytest.mark.parametrize("lost", [(110, 130), (60, 80), (300, 330)])
+def test_a_single_wrap_is_found_on_either_side_of_lost_rows(
+    lost: tuple[int, int], tmp_path: Path
+) -> None:
+    """Also in the shorter part, and where the whole motion is less than a turn from end to end."""
+    angle = 5.0 + 2.8 * np.sin(TURN * 0.08 * TIME)
+    rows = np.setdiff1d(np.arange(500), np.arange(*lost))
+    path = log(tmp_path / "a.csv", "motor_angle [rad]", np.mod(angle, TURN)[rows], TIME[rows])
+    run = run_of(streams_of(guess_columns(read_table(path))), {})
+    assert np.ptp(run["motor_angle"] - angle[rows]) < 1e-6
+
+
 def test_a_velocity_beside_a_wrapped_angle_is_kept(tmp_path: Path) -> None:
     columns = {
         "time [s]": TIME,

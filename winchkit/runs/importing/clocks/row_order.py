@@ -40,12 +40,10 @@ def rows_in_order(time: Array) -> NDArray[np.bool_]:
     return kept if is_few and np.all(np.diff(time[kept]) >= 0) else np.ones(len(time), dtype=bool)
 
 
-def longest_stretch(time: Array) -> slice:
-    """Rows of the longest stretch without a gap; ``time`` (n,), the latest row first or last."""
+def after_gaps(time: Array) -> NDArray[np.bool_]:
+    """Mask of the rows (n,) before which others are missing; none where times are not known."""
     steps = np.abs(np.diff(time))
-    if not len(steps) or not np.all(np.isfinite(steps)):
-        return slice(0, len(time))
-    gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
-    edges = np.concatenate(([0], gaps, [len(time)]))
-    longest = int(np.argmax(np.diff(edges)))
-    return slice(int(edges[longest]), int(edges[longest + 1]))
+    found = np.zeros(len(time), dtype=bool)
+    if len(steps) and np.all(np.isfinite(steps)):
+        found[1:] = steps > _GAP * np.median(steps)
+    return found

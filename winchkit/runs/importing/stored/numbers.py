@@ -11,6 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.schema.mapping import EULER, MAGNITUDE, MODULO, TWOS, VECTOR
@@ -77,26 +78,36 @@ def _unwrapped(values: Array, modulus: float) -> Array:
     return found
 
 
-def wrap_of(values: Array, usual: Collection[float], rare: Collection[float] = ()) -> Wrap | None:
+def wrap_of(
+    values: Array,
+    usual: Collection[float],
+    rare: Collection[float] = (),
+    starts: NDArray[np.bool_] | None = None,
+) -> Wrap | None:
     """Modulus of numbers (n,) that wrap, by their steps; an estimate if neither usual nor rare.
+
+    ``starts``: where stretches of rows without a gap begin (n,), whose first steps say nothing.
 
     One step is enough for a ``usual`` one: a turn in the unit of the column, a counter's range. A
     step beyond half of the range of the numbers is a wrap of modulus M where the motion continues
     over it: step ± M differs from the steps before and after it by no more than twice the largest
     change from one other step to the next, which is below M/4. No numbers are more than M apart.
     """
-    own = values[np.isfinite(values)]
+    known = np.isfinite(values)
+    own = values[known]
     if len(own) < _FEWEST:
         return None
-    steps = np.diff(own)
-    span = float(np.ptp(own))
+    steps, span = np.diff(own), float(np.ptp(own))
+    stretch = np.cumsum(np.zeros(len(values)) if starts is None else starts)[known]
+    is_inside = np.diff(stretch) == 0
     is_jump = np.abs(steps) > span / 2
-    plain, at = np.flatnonzero(~is_jump), np.flatnonzero(is_jump)
+    plain, at = np.flatnonzero(is_inside & ~is_jump), np.flatnonzero(is_inside & is_jump)
     if not span or not len(at) or len(plain) < _FEWEST // 2:
         return None
     largest = float(np.max(np.abs(steps[plain])))
     sizes = np.abs(np.interp(at, plain, steps[plain]) - steps[at])
-    bend = 2 * float(np.max(np.abs(np.diff(steps[plain])), initial=0.0))
+    is_next = np.diff(stretch[plain]) == 0
+    bend = 2 * float(np.max(np.abs(np.diff(steps[plain])[is_next]), initial=0.0))
     fitting = [
         modulus
         for modulus in {*usual, *(rare if len(at) > 1 else ())}

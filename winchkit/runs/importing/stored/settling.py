@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.runs.importing.assignment import (
@@ -17,7 +18,7 @@ from winchkit.runs.importing.assignment import (
     clock_values,
     is_whole,
 )
-from winchkit.runs.importing.clocks.row_order import longest_stretch, rows_in_order
+from winchkit.runs.importing.clocks.row_order import after_gaps, rows_in_order
 from winchkit.runs.importing.consistency import USUAL_COUNTS
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.stored.numbers import restored, wrap_of
@@ -53,7 +54,7 @@ def settle_stored(work: Work) -> None:
         elif name not in work.answers.unsigned:
             unit = item.candidate.unit
             is_small = unit is not None and unit.dimension == SHARE
-            values = _in_order(work, item)
+            values = _in_order(work, item)[0]
             sign = lost_sign(values, is_small=is_small)
             if sign is None and item.role in {"motor_velocity", "motor_torque"}:
                 sign = sign_by_jumps(values)
@@ -77,15 +78,15 @@ def _settle_clock_wrap(work: Work, clock: ChosenColumn) -> None:
             work.notes.append(f"'{name}' is a clock that wraps at {modulus:.12g} ({times})")
 
 
-def _in_order(work: Work, item: ChosenColumn, *, is_whole: bool = True) -> Array:
-    """Values of a column in the order of time, or of the longest stretch without a gap."""
+def _in_order(work: Work, item: ChosenColumn) -> tuple[Array, NDArray[np.bool_]]:
+    """Values of a column in the order of time, and where rows begin again after a gap."""
     clock = clock_of(work, item)
     times = np.zeros(0) if clock is None else clock_values(clock)
     values = item.column.values
     if len(times) != len(values):
-        return values
+        return values, np.zeros(len(values), dtype=bool)
     kept = rows_in_order(times)
-    return values[kept] if is_whole else values[kept][longest_stretch(times[kept])]
+    return values[kept], after_gaps(times[kept])
 
 
 def _restore(item: ChosenColumn, stored: str) -> None:
@@ -97,7 +98,8 @@ def _restore(item: ChosenColumn, stored: str) -> None:
 def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
     """Unwrap an angle or a counter by its steps; whether it wraps, for certain or perhaps."""
     usual, rare = _moduli(work, item)
-    wrap = wrap_of(_in_order(work, item, is_whole=False), usual, rare) if usual else None
+    values, starts = _in_order(work, item)
+    wrap = wrap_of(values, usual, rare, starts) if usual else None
     if wrap is None:
         return False
     name = item.column.source
