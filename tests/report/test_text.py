@@ -103,7 +103,9 @@ def test_every_step_has_the_error_before_and_after_it_and_its_share() -> None:
             output = answer.diagnosis.outputs[name]
             assert lowered_most(fall) == name
             assert fall[0][name] == pytest.approx(output.heldout_rms_before, rel=0.02)
-            assert fall[1][name] == pytest.approx(output.heldout_rms_after, rel=0.1), "a small third"
+            assert fall[1][name] == pytest.approx(output.heldout_rms_after, rel=0.1), (
+                "a small third"
+            )
             assert step.explains == pytest.approx(step.share, abs=0.02)
         told = step_text(step, answer.diagnosis.outputs, fall)
         assert "→" in told
