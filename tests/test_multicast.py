@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from contextlib import ExitStack, closing
 import can
 import pytest
 
+from command_line import own_process
 from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 from winchkit.sim.live.buses import wired
@@ -94,19 +94,15 @@ def test_a_group_on_the_loopback_is_reached_beside_a_network() -> None:
     """The route to the group decides where frames go, not that to everything else."""
     if shutil.which("unshare") is None or shutil.which("ip") is None:
         pytest.skip("no unshare or no ip here")
-    made = subprocess.run(
-        ["unshare", "-rn", "sh", "-ec", f"{_TWO_INTERFACES}exec {sys.executable} -c 'pass'"],
-        check=False,
-        capture_output=True,
-        text=True,
+    made = own_process(
+        "unshare",
+        "-rn",
+        "sh",
+        "-ec",
+        f"{_TWO_INTERFACES}exec {sys.executable} -c 'pass'",
+        code=None,
     )
     if made.returncode:
         pytest.skip(f"no second network here: {made.stderr.strip()}")
     script = f'{_TWO_INTERFACES}exec "$0" -c "$1"'
-    done = subprocess.run(
-        ["unshare", "-rn", "sh", "-ec", script, sys.executable, _EXCHANGE],
-        check=False,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    own_process("unshare", "-rn", "sh", "-ec", script, sys.executable, _EXCHANGE)

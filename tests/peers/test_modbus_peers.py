@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from command_line import own_process
 from served import Served
 from waiting import until
 from winchkit import catalog
@@ -40,7 +41,7 @@ def mbpoll(served: Served, *arguments: str, values: tuple[str, ...] = ()) -> tup
         where, port = served.line.address
         line = ["-m", "tcp", "-p", str(port)]
     words = ["mbpoll", *line, "-a", "1", "-0", "-1", "-o", "1", *arguments, where, *values]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+    done = own_process(*words, code=None)
     return done.returncode, done.stdout + done.stderr
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from fed import BENCHMARKS, SUPPORT, Fed, SetClock, recording
+from waiting import run_together
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import open_writer, read_run, write_run
@@ -236,10 +237,7 @@ def test_of_threads_that_begin_at_once_exactly_one_logs(tmp_path: Path) -> None:
             refused.append(error)
 
     threads = [threading.Thread(target=begin) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert (len(began), len(refused)) == (1, 3)
     began[0].close()
 

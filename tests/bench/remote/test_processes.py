@@ -23,6 +23,7 @@ import pytest
 
 from client_stalls import served as stalls_served
 from client_stalls import stall
+from command_line import own_process
 from sim_process import WINCHKIT, served_bench, start
 from waiting import until
 from winchkit import attach, open_bench
@@ -39,14 +40,7 @@ pytestmark = [
 
 
 def winchkit(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*WINCHKIT, *arguments],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    return own_process(*WINCHKIT, *arguments, code=None, stdin=subprocess.DEVNULL)
 
 
 def relaxed(text: str) -> str:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from can_commands import Served, length, served, without_trip
-from command_line import invoke
+from command_line import done, invoke
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase
@@ -46,11 +46,9 @@ def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
         assert station.upload("A", 0x5FFF, 0) is None
         # The other commands of this process go through the owner as well.
         assert "mode CSV" in invoke("info", "A", "-b", bench.file).stdout
-        refused = invoke("config", "store", "A", "-b", bench.file, "--yes")
-        assert refused.exit_code == 5
+        refused = done("config", "store", "A", "-b", bench.file, "--yes", code=5)
         assert "is owned by another process" in refused.stderr
-        lss = invoke("lss", "list", "-b", bench.file)
-        assert lss.exit_code == 5
+        done("lss", "list", "-b", bench.file, code=5)
 
 
 def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:

@@ -89,6 +89,7 @@ def read(rig: Rig) -> Iterator[tuple[ProcessInstrument, SlowDevices]]:
     bus = CanBus(BusSpec("can", interface="virtual", channel=rig.channel), "can", CLOCK)
     instrument = ProcessInstrument("cell", device(), NODE, bus, CLOCK)
     slow = SlowDevices([ProcessLine("can", (instrument,), CLOCK)])
+    until(lambda: instrument.latest is not None)
     yield instrument, slow
     slow.close()
     bus.close()
@@ -113,7 +114,6 @@ def test_overload_and_a_broken_sensor_are_no_numbers(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     for kind, flag in (("overload", Quality.OVERLOAD), ("sensor break", Quality.FAULT)):
         rig.node.inject(kind)
         until(lambda flag=flag: bool(instrument.latest and flag in instrument.latest.quality))  # type: ignore[misc]
@@ -127,7 +127,6 @@ def test_a_silent_node_is_reported_and_set_up_again(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     rig.node.inject("silence")
     until(lambda: instrument.problem is not None)
     assert isinstance(instrument.problem, NoReply)
@@ -141,7 +140,6 @@ def test_a_node_that_reboots_sends_again(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     rig.node.inject("reboot")
     until(lambda: instrument.counters.reconnects >= 1)
     count = instrument.counters.readings
@@ -152,7 +150,6 @@ def test_commands_are_written_and_the_eeprom_on_purpose_only(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, slow = read
-    until(lambda: instrument.latest is not None)
     slow.command(instrument, "tare")
     assert any(
         identifier == 0x600 + NODE and data[1:] == bytes((0x04, 0x21, 0x00, 0xBA, 0xC1, 0, 0))

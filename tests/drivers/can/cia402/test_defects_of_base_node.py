@@ -11,7 +11,7 @@ import pytest
 
 from drive_on_bus import CLOCK, Driven, device, run_cycles, run_until
 from hand_made import NODE, RPDO, HandMade, codec
-from waiting import until
+from waiting import run_together, until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
@@ -176,10 +176,7 @@ def test_8_sdo_of_four_threads_do_not_mix(rig: Driven) -> None:
                 wrong.append(error)
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert wrong == []
 
 
