@@ -168,7 +168,6 @@ def test_web(recorded: Path) -> None:
         text=True,
     ) as process:
         try:
-            assert process.stdout is not None
             url = process.stdout.readline().strip()
             with urllib.request.urlopen(url, timeout=60) as page:
                 assert b"<title>" in page.read()

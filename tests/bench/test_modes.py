@@ -41,7 +41,6 @@ def test_the_drive_keeps_the_limits_that_it_is_given() -> None:
         objects, winch = live.winches["A"].drive.objects, bench.winch["A"]
         turn = objects.number(0x608F, 1) / objects.number(0x608F, 2)
         low, high = (objects.number(0x607D, sub) / turn * 2 * math.pi for sub in (1, 2))
-        assert limits.length is not None
         # Winding in shortens the cable: the lowest angle goes with the longest one.
         assert winch.length_at(low) == pytest.approx(limits.length[1] + 0.02, abs=1e-4)
         assert winch.length_at(high) == pytest.approx(limits.length[0] - 0.02, abs=1e-4)

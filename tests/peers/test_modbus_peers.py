@@ -112,7 +112,6 @@ def bus(server: Path, request: pytest.FixtureRequest) -> Iterator[BusSpec]:
     process = subprocess.Popen(
         [server, cable.near if cable else "tcp"], stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     told = process.stdout.readline().strip()
     try:
         if cable:
@@ -134,7 +133,6 @@ def test_our_reader_reads_and_tares_libmodbus(bus: BusSpec) -> None:
     try:
         until(lambda: instrument.counters.readings > 10)
         reading = instrument.latest
-        assert reading is not None
         assert reading.value == pytest.approx(-25.0)
         assert reading.gross == pytest.approx(123.45)
         assert slow.identify(instrument)["serial number"] == 815

@@ -248,7 +248,6 @@ def write(path: Path, names: str = "12345678", **replaced: str) -> Path:
 
 def test_a_robot_is_read_in_si(tmp_path: Path) -> None:
     spec = read_bench(write(tmp_path / "bench.toml"))
-    assert spec.robot is not None
     assert spec.robot.tracker is not None
     assert spec.robot.tension == (60.0, 800.0)
     assert spec.robot.rotation_speed == pytest.approx(radians(20))

@@ -150,7 +150,6 @@ def test_trouble_without_motion_blocks_but_is_not_latched() -> None:
     rig.run(1.0)
     assert not kinds(rig)
     snapshot = rig.loop.snapshot
-    assert snapshot is not None
     assert {trip.kind for trip in snapshot.blocked} == {"cell stale"}
 
 

@@ -63,7 +63,6 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def state(served: Path) -> tuple[float, str]:
     """True cable length, m, and the drive's state, by the simulation."""
     found = re.match(r"A: ([\d.]+) m, .* kg, ([a-z ]+)", send(served, "status"))
-    assert found is not None
     return float(found[1]), found[2]
 
 
@@ -156,7 +155,6 @@ def test_jog_moves_and_says_where_it_is(served: Path) -> None:
     after, _ = state(served)
     assert 0.05 < after - before < 0.12
     shown = re.match(r"A: ([\d.]+) m", done.stdout)
-    assert shown is not None
     assert float(shown[1]) == pytest.approx(after, abs=5e-3)
     back = winchkit("jog", "-b", str(served), "--wind-in", "50mm", "--speed", "0.1m/s")
     assert back.returncode == 0, back.stderr

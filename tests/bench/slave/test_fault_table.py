@@ -380,7 +380,6 @@ def _unsigned_target(bench: Bench) -> None:
         raise OverflowError("can't convert negative int to unsigned")
 
     commander = bench.axes["A"]._commander
-    assert commander is not None
     commander.frames = encode  # type: ignore[method-assign, assignment]
 
 

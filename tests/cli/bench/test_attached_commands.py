@@ -41,7 +41,6 @@ def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
         assert [item.winch for item in station.scan()] == ["A", "B"]
         assert {item.heartbeat for item in station.scan()} == {"operational"}
         told = station.upload("A", 0x6007, 0)
-        assert told is not None
         assert told[0] == bench.number(0x6007)
         assert station.upload("A", 0x5FFF, 0) is None
         # The other commands of this process go through the owner as well.
@@ -71,7 +70,6 @@ def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
 def owned(bench: Bench) -> Iterator[RemoteStation]:
     """A station as another process would have it."""
     station = attach(bench.spec)
-    assert station is not None
     try:
         yield station
     finally:

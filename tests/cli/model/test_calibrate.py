@@ -75,7 +75,6 @@ def test_the_profile_written_is_the_robot_calibrated(run: Path, tmp_path: Path) 
             "2.winding_radius": line.winch.drum.winding_radius,
         }[name]
         assert there == pytest.approx(found["parameters"][name]["value"], abs=1e-9)
-    assert robot.fitted is not None
     assert robot.fitted.runs == ("poses.csv",)
     assert robot.fitted.poses == 81
     assert "1.exit_point.x" in robot.fitted.std

@@ -45,7 +45,6 @@ class Rig:
         self.seen: list[tuple[int, bytes]] = []
         self._port = can.Bus(interface="virtual", channel=self.channel)
         found = device()
-        assert found.process is not None
         eds = Path(found.path).parent / found.process.eds
         self.node = SimInstrument(
             found.process, eds, NODE, lambda: self.force, self._send, now=time.monotonic()
@@ -101,7 +100,6 @@ def test_values_come_by_tpdo_with_their_times(
     instrument, _ = read
     until(lambda: instrument.counters.readings > 5)
     reading = instrument.latest
-    assert reading is not None
     assert reading.value == pytest.approx(123.25)
     assert reading.t_sample < reading.t_receive - 0.02
     assert instrument.problem is None
@@ -117,7 +115,6 @@ def test_overload_and_a_broken_sensor_are_no_numbers(
     for kind, flag in (("overload", Quality.OVERLOAD), ("sensor break", Quality.FAULT)):
         rig.node.inject(kind)
         until(lambda flag=flag: bool(instrument.latest and flag in instrument.latest.quality))  # type: ignore[misc]
-        assert instrument.latest is not None
         assert math.isnan(instrument.latest.value)
         rig.node.inject("recover")
         until(lambda: bool(instrument.latest and instrument.latest.quality.usable))
@@ -173,7 +170,6 @@ def test_values_are_asked_for_where_none_are_sent(rig: Rig) -> None:
     slow = SlowDevices([ProcessLine("can", (instrument,), CLOCK)])
     try:
         until(lambda: instrument.counters.readings > 3)
-        assert instrument.latest is not None
         assert instrument.latest.value == pytest.approx(123.25)
         assert not any(identifier == 0x180 + NODE and data for identifier, data in rig.seen[:2])
     finally:
@@ -185,7 +181,6 @@ def test_a_simulated_thermometer_shows_kelvin(tmp_path: Path) -> None:
     """A unit with another zero than SI's was shown without it."""
     declared = catalog.find("devices", "generic-cia404")
     process = device().process
-    assert process is not None
     eds = declared.parent / process.eds
     text = declared.read_text().replace('unit = "N"', 'unit = "K"')
     warm = tmp_path / declared.name

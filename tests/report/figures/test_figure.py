@@ -227,7 +227,6 @@ OUTPUTS = {"tension": AT_NOISE, "cable_length": NOISY, "motor_torque": FRICTIONA
 
 def test_the_ladder_has_the_ratios_and_the_worst_first() -> None:
     ladder = error_ladder(OUTPUTS, extended=True, changed="with x")
-    assert ladder is not None
     rows = list(csv.DictReader(io.StringIO(ladder.table().csv())))
     assert [row["output"] for row in rows] == ["motor torque", "cable length", "tension"]
     for row, output in zip(rows, (FRICTIONAL, NOISY, AT_NOISE), strict=True):

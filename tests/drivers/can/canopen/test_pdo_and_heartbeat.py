@@ -106,7 +106,6 @@ def test_producer_beats_as_often_as_it_is_asked_and_no_more(steps: list[float]) 
 
 def test_emergencies_in_words() -> None:
     emergency = parse_emergency(bytes.fromhex("308110") + b"vendr", 1.0)
-    assert emergency is not None
     assert emergency.code == 0x8130
     assert "lost the host" in str(emergency)
     assert parse_emergency(b"\x30\x81", 1.0) is None
@@ -217,7 +216,6 @@ def rig() -> Iterator[tuple[DriveOnBus, CanBus]]:
 def with_second_tpdo(transmission: int, event_timer: float) -> DeviceSpec:
     """The generic drive, its TPDO 2 (velocity, torque, error) sent less often."""
     spec = device()
-    assert spec.servo is not None
     first, second = spec.servo.tpdo
     slower = dataclasses.replace(second, transmission=transmission, event_timer=event_timer)
     return dataclasses.replace(spec, servo=dataclasses.replace(spec.servo, tpdo=(first, slower)))
@@ -239,6 +237,5 @@ def test_a_drive_is_moved_with_slower_feedback_of_its_speed(
         time.sleep(0.006)
         axis.send(RequestedState.ENABLE, velocity=3.0)
     assert axis.state is DriveState.OPERATION_ENABLED
-    assert axis.feedback is not None
     assert axis.feedback.velocity == pytest.approx(3.0, rel=0.05)
     assert axis.health.complete >= 45

@@ -31,7 +31,6 @@ def axis(rig: Driven) -> Cia402Axis:
 
 def node_on(bus: CanBus, node: int = 1) -> SdoNode:
     spec = device()
-    assert spec.servo is not None
     return SdoNode(bus, node, Path(spec.path).parent / spec.servo.eds)
 
 
@@ -91,7 +90,6 @@ def test_4_a_refused_mode_is_an_error(rig: Driven, axis: Cia402Axis) -> None:
     """And nothing was written for it."""
     drive, _ = rig
     run_cycles(rig, axis, RequestedState.DISABLE, 3)
-    assert axis.drive is not None
     missing = next(m for m in ("IP", "CST", "PT", "XX") if m not in axis.drive.modes)
     before = len(drive.frames)
     with pytest.raises(NotPermitted, match=f"no mode {missing}; it has PP"):
