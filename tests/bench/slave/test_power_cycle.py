@@ -105,7 +105,8 @@ def test_a_power_cycle_makes_the_length_of_an_incremental_encoder_unknown(
         assert bench.winch["A"].cable_length == pytest.approx(3.86, abs=1e-3)
 
 
-def test_an_absolute_encoder_needs_no_record(rig: Rig) -> None:
+def test_an_absolute_encoder_needs_no_record(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
     homed_and_closed(rig, "absolute")
     rig.power_cycle()
     Path(rig.bench_file.with_suffix(".position.json")).unlink()
