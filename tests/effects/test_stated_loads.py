@@ -1,4 +1,8 @@
-"""Loads that are stated: errors of inputs, and a joint recorded with several payloads."""
+"""Loads that are stated: errors of inputs, and a joint recorded with several payloads.
+
+The arm of the joint has weight, inertia and friction of its own; every torque is a closed form of
+the motion.
+"""
 
 from __future__ import annotations
 

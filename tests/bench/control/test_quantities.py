@@ -1,4 +1,8 @@
-"""The verdict of the supervisor's tests: of bounds by their formulas, of facts by every row."""
+"""The verdict of the supervisor's tests: of bounds by their formulas, of facts by every row.
+
+The formulas of docs/safety.md stand here a second time, on the observations themselves. A table
+with them in place of the quantities has no bounds that the supervisor could test first.
+"""
 
 from __future__ import annotations
 

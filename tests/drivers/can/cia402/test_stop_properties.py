@@ -1,4 +1,8 @@
-"""Control words for every state, by the standard's bit patterns, and stops of an own drive."""
+"""Control words for every state, by the standard's bit patterns, and stops of an own drive.
+
+The drive here is a table of the standard's command patterns and of what quick stop leads to. The
+host sees its status words some cycles late, as on a bus, and one of them may be lost.
+"""
 
 from __future__ import annotations
 
