@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +111,34 @@ def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, w
     result = invoke("compare", run, "-p", profile, "--predicted", given)
     assert result.exit_code in {2, 3}
     assert words in result.stderr
+
+
+LINEAR = {"motor_angle [rad]": "position [m]", "torque [N m]": "force [N]", "motor_force": "force"}
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_joints_of_an_arm_are_axes_and_no_winches(tmp_path: Path, linear: bool) -> None:
+    run, profile = arm(tmp_path)
+    names, *rows = run.read_text().splitlines()
+    for rotary, own in LINEAR.items() if linear else ():
+        names = names.replace(rotary, own)
+    time, *own_names = names.split(",")
+    columns = [f"{joint}.{name}" for joint in ("A", "B") for name in own_names]
+    rows = [f"{row},{row.partition(',')[2]}" for row in rows]
+    run.write_text("\n".join([",".join([time, *columns]), *rows]))
+    profile.write_text(JOINT + 'motion = "linear"\n' * linear)
+    page, friction = tmp_path / "page.html", "force" if linear else "torque"
+    for command in ("compare", "diagnose"):
+        result = invoke(command, run, "-p", profile, "--winch", "all", "--html", page)
+        assert "axis A\n" in result.stdout
+        assert "all 2 axes\n" in result.stdout
+        for text in (result.stdout, shown(page)):
+            assert not re.search(r"(?<!--)\bwinch(?!kit)", text, re.IGNORECASE)
+    assert f"in all 2, equal in size: {friction} = 1.19" in " ".join(result.stdout.split())
+    assert "has columns of A, B" in invoke("compare", run, "-p", profile).stderr
+
+
+def shown(page: Path) -> str:
+    """The words of a page."""
+    text = re.sub(r"<(style|script|pre).*?</\1>", "", page.read_text(encoding="utf-8"), flags=re.S)
+    return re.sub(r"<[^>]*>", " ", text)

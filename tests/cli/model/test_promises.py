@@ -241,17 +241,17 @@ def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     result = invoke("compare", both, "-p", "bench-spiral", "--json")
     assert result.exit_code == 2
     assert result.stdout == ""
-    assert "has the winches A, B; choose one with --winch" in result.stderr
+    assert "has columns of A, B; choose one with --winch" in result.stderr
     one = answer("compare", both, "-p", "bench-spiral", "--winch", "A")["outputs"]
     alone = answer("compare", runs[0], "-p", "bench-spiral")["outputs"]
     assert one["tension"]["rms"] == pytest.approx(alone["tension"]["rms"], rel=1e-6)
     assert one != answer("compare", both, "-p", "bench-spiral", "--winch", "B")["outputs"]
     wrong = invoke("compare", both, "-p", "bench-spiral", "--winch", "C")
     assert wrong.exit_code == 2
-    assert "no winch 'C'; it has A, B" in wrong.stderr
+    assert "no winch or axis 'C'; it has A, B" in wrong.stderr
     other = invoke("compare", runs[0], "-p", "bench-spiral", "--winch", "B")
     assert (other.exit_code, other.stdout) == (2, ""), "its metadata name winch A"
-    assert "no winch 'B'; it has A" in other.stderr
+    assert "no winch or axis 'B'; it has A" in other.stderr
 
 
 @pytest.fixture(scope="module")
@@ -329,7 +329,7 @@ def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> N
     asked = ("compare", path, "-p", "bench-spiral", "--winch", "all")
     refused = invoke(*asked, "--html", tmp_path / "o.html")
     assert refused.exit_code == 2
-    assert "no page for each of the winches" in refused.stderr
+    assert "no page for each of" in refused.stderr
     assert list(answer(*asked)["winches"]) == ["x y", "x-y"]
 
 
