@@ -11,6 +11,8 @@ import pytest
 from model_files import invoke
 from winchkit import compare, diagnose, read_profile, read_run
 from winchkit.arrays import Array
+from winchkit.runs import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
 
 JOINT = 'schema = 1\nkind = "axis"\nname = "joint"\n'
 HEADER = "time [s],motor_angle [rad],motor_torque [N m],predicted_torque [N m]"
@@ -104,6 +106,8 @@ def test_a_column_of_another_name_is_named(tmp_path: Path, way: str) -> None:
         ("tension=predicted_torque", "write motor_torque=COLUMN"),
         ("motor_torque", "write motor_torque=COLUMN"),
         ("motor_torque=motor_angle", "a unit of angle, not of torque"),
+        ("motor_torque=motor_torque", "'motor_torque' is measured; name the column of your model"),
+        ("motor_torque=time", "'time' is measured"),
     ],
 )
 def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, words: str) -> None:
@@ -111,6 +115,40 @@ def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, w
     result = invoke("compare", run, "-p", profile, "--predicted", given)
     assert result.exit_code in {2, 3}
     assert words in result.stderr
+
+
+def test_a_prediction_that_is_infinite_is_refused(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    first, last = run.read_text().rstrip().rsplit(",", 1)
+    run.write_text(f"{first},inf\n".replace("predicted_torque", "tau"))
+    assert last
+    result = invoke("compare", run, "-p", profile, "--predicted", "motor_torque=tau")
+    assert (result.exit_code, "column 'tau' is infinite" in result.stderr) == (3, True)
+
+
+def test_the_motion_is_not_simulated_without_the_model_of_its_prediction(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    profile.write_text(JOINT + '[motor]\ninertia = "1.9 kg m^2"\n')
+    for command in (["compare", run, "--forward"], ["forward", "--torque", run, "-o", "x.csv"]):
+        result = invoke(*command, *(["-p"] * (command[0] == "compare")), profile)
+        assert result.exit_code == 3
+        assert "no other motion can be simulated with it" in result.stderr
+
+
+def test_a_law_that_explains_no_more_than_a_simpler_one_but_predicts_better_is_a_step() -> None:
+    """Its set did not hold it, which ended in an internal error."""
+    time = np.arange(0.0, 20.0, 0.01)
+    angle, rate, _ = _rigid_body(time)
+    acceleration = -0.972 * np.sin(0.9 * time) - 2.116 * np.sin(2.3 * time)
+    torque = 2 * acceleration + 0.5 * rate
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(time))
+    channels = {
+        "motor_angle": Channel(angle, "rad"),
+        "motor_torque": Channel(torque + noise, "N m"),
+        "predicted_torque": Channel(1000 * torque, "N m"),
+    }
+    found = diagnose([Run("m", time, channels)], AxisProfile("joint")).diagnosis
+    assert found.steps[0].effects[0] == "spring-balancer"
 
 
 LINEAR = {"motor_angle [rad]": "position [m]", "torque [N m]": "force [N]", "motor_force": "force"}

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from command_line import invoke
 from simulated_profiles import (
     ARM,
     AXIS,
@@ -31,8 +32,9 @@ from winchkit.effects import Effect, Values
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
-from winchkit.errors import RunError, UsageError
+from winchkit.errors import FileError, RunError, UsageError
 from winchkit.model.stages import At
+from winchkit.runs import write_run
 from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of
@@ -231,6 +233,23 @@ def test_wrong_inputs_have_one_sentence(
     with pytest.raises((RunError, UsageError), match=said) as raised:
         forward(profile, **arguments)
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("speed", ["0", "1 m/s", "inf rad/s", "1e400 rad/s", ""])
+def test_an_initial_speed_that_is_none_is_named(tmp_path: Path, speed: str) -> None:
+    profile_of(tmp_path, AXIS)
+    write_run(torque_run(np.zeros(10)), tmp_path / "run.csv")
+    options = ["--torque", tmp_path / "run.csv", "-o", tmp_path / "out.csv"]
+    result = invoke("forward", tmp_path / "machine.toml", *options, "--initial-speed", speed)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("winchkit: --initial-speed: ")
+
+
+def test_an_infinite_value_is_refused(tmp_path: Path) -> None:
+    effect = ("rotor-inertia", 'inertia = "inf kg m^2"')
+    bare = AXIS.partition("[motor]")[0]
+    with pytest.raises(FileError, match=r"'inf kg m\^2' must be finite"):
+        forward(profile_of(tmp_path, bare, effect), torque=torque_run(np.ones(10)))
 
 
 def stepless(torque: NDArray[np.float64], at: At, values: Values) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from winchkit.arguments import number, positive, require_type
 from winchkit.arrays import Array
-from winchkit.dynamics.balance import balance
+from winchkit.dynamics.balance import balance, refuse_load
 from winchkit.dynamics.drives import RECORDED, Inputs, cascade
 from winchkit.dynamics.integration import Integrator, SimulatedMotion, holding_torque
 from winchkit.effects.bind import terms_of
@@ -102,20 +102,12 @@ def forward(
     """
     require_type(profile, WinchProfile, "profile")
     tolerance = positive("forward", "tolerance", tolerance, _COARSEST)
-    if load_mass is not None:
-        load_mass = positive("forward", "load_mass", load_mass)
+    terms = terms_of(profile, catalogue)
     if initial_speed is not None:
         initial_speed = number("forward", "initial_speed", initial_speed)
-    terms = terms_of(profile, catalogue)
-    if (
-        load_mass is not None
-        and isinstance(profile, AxisProfile)
-        and not any("payloads" in term.effect.needs for term in terms)
-    ):
-        raise UsageError(
-            f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
-            "would hang on it: leave the load out, or add the effect joint-payload"
-        )
+    if load_mass is not None:
+        load_mass = positive("forward", "load_mass", load_mass)
+        refuse_load(profile, terms, load_mass)
     sources = {"programme": programme, "torque": torque, "reference": reference}
     given = [name for name, source in sources.items() if source is not None]
     if len(given) != 1:
@@ -237,6 +229,12 @@ def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
     to the last sample at which all is known; short gaps are straight lines. Raises RunError for
     fewer than two samples and for a longer gap."""
     (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+    if "predicted_torque" in run:
+        message = (
+            "has the torque of another model, which is known along the measured motion only: no "
+            "other motion can be simulated with it; leave that column out"
+        )
+        raise RunError(Fault(message, run.path or run.name))
     used = {_driving(run, is_torque=is_torque), "motor_angle", "motor_velocity"}
     if not isinstance(profile, AxisProfile) and run.load_mass is None:
         used.add("load")
