@@ -25,7 +25,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.schema.linear_axis import CHANNELS, UNITS
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.programme import Programme
+from winchkit.schema.programme import ALL, Programme
 from winchkit.units import GRAVITY
 
 _COARSEST = 0.01
@@ -90,7 +90,7 @@ def forward(
     ------
     UsageError
         For none or several of the three sources, effects without a step, a profile without inertia
-        or without gains, and a cable that becomes slack.
+        or without gains, a programme of several winches, and a cable that becomes slack or ends.
     RunError
         For a run without torque or initial speed, or with missing values.
 
@@ -114,6 +114,8 @@ def forward(
         had = " and ".join(given) or "none"
         raise UsageError(f"give one of a programme, a torque and a reference; there is {had}")
     if programme is not None:
+        if initial_speed is not None:
+            raise UsageError("a programme starts from rest: leave the initial speed out")
         setup = _of_programme(profile, terms, programme, load_mass, rate)
     else:
         run = torque if torque is not None else reference
@@ -292,9 +294,15 @@ def _of_programme(
             f"profile '{profile.name}' is an axis, and a motion programme has cable lengths: give "
             "--reference RUN with the motor angles to follow"
         )
+    winches = sorted({step.winch for step in programme.step} - {ALL})
+    if len(winches) > 1:
+        raise UsageError(
+            f"programme '{programme.name}' moves {', '.join(winches)}, and one winch is simulated: "
+            "leave the steps of the others out"
+        )
     if not 0.0 < rate <= 1 / _REFERENCE_STEP:
         raise UsageError(f"rate {rate:g} Hz must be above 0 and at most {1 / _REFERENCE_STEP:g} Hz")
-    ends = programme.approach(programme.step[0].winch)
+    ends = programme.approach(*winches or [ALL])
     here = ends[-1] if ends else profile.reference.cable_length or 0.0
     mass = load_mass
     lengths, speeds = [np.array([here])], [np.zeros(1)]
@@ -328,7 +336,8 @@ def _of_programme(
     every = np.arange(0.0, time[-1], 1 / rate)
     if len(every) < 2:
         raise UsageError(
-            f"programme '{programme.name}' has no move and no hold under its first load"
+            f"programme '{programme.name}' has no move and no hold under its first load, "
+            f"from where it ends, {here:g} m"
         )
     inputs = Inputs(time, {"goal": angle, "goal_speed": -paid_out / arm})
     return Setup(f"{programme.name}-forward", every, float(angle[0]), 0.0, inputs, mass)
@@ -368,6 +377,12 @@ def _readings(
     line = Line(profile, modifiers_of(terms))
     predicted = line.predict(replace(measured, load=motion.load if setup.has_load else None))
     out["cable_length"] = Channel(predicted["cable_length"], "m")
+    wound = np.flatnonzero(predicted["cable_length"] < 0.0)
+    if len(wound) and profile.reference.cable_length is not None:
+        raise UsageError(
+            f"all of the cable is wound in at {motion.time[wound[0]]:.4g} s: its free length would "
+            "be below 0 from there on; cut the run there, or check its torque and load"
+        )
     if setup.has_load:
         out["load"] = Channel(motion.load, "N")
         out["tension"] = Channel(predicted["tension"], "N")
