@@ -160,6 +160,8 @@ def test_joints_of_an_arm_are_axes_and_no_winches(tmp_path: Path, linear: bool) 
     names, *rows = run.read_text().splitlines()
     for rotary, own in LINEAR.items() if linear else ():
         names = names.replace(rotary, own)
+    names = names.replace("predicted_torque", "tau_model")
+    options = () if linear else ("--predicted", "motor_torque=tau_model")
     time, *own_names = names.split(",")
     columns = [f"{joint}.{name}" for joint in ("A", "B") for name in own_names]
     rows = [f"{row},{row.partition(',')[2]}" for row in rows]
@@ -167,7 +169,7 @@ def test_joints_of_an_arm_are_axes_and_no_winches(tmp_path: Path, linear: bool) 
     profile.write_text(JOINT + 'motion = "linear"\n' * linear)
     page, friction = tmp_path / "page.html", "force" if linear else "torque"
     for command in ("compare", "diagnose"):
-        result = invoke(command, run, "-p", profile, "--winch", "all", "--html", page)
+        result = invoke(command, run, "-p", profile, "--winch", "all", "--html", page, *options)
         assert "axis A\n" in result.stdout
         assert "all 2 axes\n" in result.stdout
         for text in (result.stdout, shown(page)):

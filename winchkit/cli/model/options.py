@@ -96,7 +96,13 @@ class Asked:
             if self.predicted is not None:
                 raise UsageError("--predicted: is of one winch or axis, not of a robot")
             return read_all(paths)
-        runs = read_runs(paths, self.winch)
+        return self._predicted(read_runs(paths, self.winch))
+
+    def runs_of_each(self, paths: Sequence[str]) -> dict[str, list[Run]]:
+        """Runs of every winch or axis that is in all of them. Raises FileError, UsageError."""
+        return {name: self._predicted(runs) for name, runs in read_each(paths).items()}
+
+    def _predicted(self, runs: list[Run]) -> list[Run]:
         if self.predicted is None:
             return runs
         from winchkit.runs.predicted import with_prediction
@@ -112,9 +118,7 @@ class Asked:
 
     @property
     def each(self) -> bool:
-        """Whether every winch of the runs is asked for by itself. Raises UsageError."""
-        if self.winch == ALL and self.predicted is not None:
-            raise UsageError("--predicted: is of one winch or axis; name it by --winch")
+        """Whether every winch or axis of the runs is asked for by itself."""
         return self.winch == ALL
 
     @property

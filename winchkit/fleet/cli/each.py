@@ -16,7 +16,6 @@ from winchkit.cli.model.options import (
     Asked,
     page_title,
     pages_beside,
-    read_each,
     save_figures,
     save_page,
     suggest_with,
@@ -48,7 +47,7 @@ def tell_diagnoses(
     present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
     with threads_abandoned(), progress_bar() as progress:
-        winches = read_each(runs)
+        winches = asked.runs_of_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         each = diagnose_each(winches, declared, catalogue, asked.band, **how, progress=progress)
         for name, answer in each:
@@ -98,7 +97,7 @@ def tell_comparisons(
     found, errors = {}, {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
     with progress_bar() as progress:
-        winches = read_each(runs)
+        winches = asked.runs_of_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         for index, (name, own) in enumerate(winches.items()):
             progress(name, index / len(winches))
