@@ -20,6 +20,7 @@ from winchkit.model.line import Line
 from winchkit.model.line import Motion as LineMotion
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import JERK_TIME, plan
+from winchkit.runs.gaps import lost_samples
 from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.linear_axis import CHANNELS, UNITS
@@ -260,7 +261,7 @@ def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
     for name, whole in own.items():
         values = whole[kept]
         there = np.flatnonzero(np.isfinite(values))
-        gaps = np.where(np.diff(there) > 1, np.diff(time[there]), 0.0)
+        gaps = np.where(lost_samples(time[there]), np.diff(time[there]), 0.0)
         longest = int(np.argmax(gaps))
         if gaps[longest] > _BRIDGED:
             message = (
