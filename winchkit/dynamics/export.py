@@ -46,7 +46,7 @@ def export_model(
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional
-        Mass on the cable of a winch, kg, for MuJoCo.
+        Mass on the cable of a winch, or payload of an axis, kg, for MuJoCo.
 
     Returns
     -------
