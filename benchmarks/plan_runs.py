@@ -90,6 +90,8 @@ class Outcome:
     left: tuple[str, ...]
     """Members of the set in the end."""
     right: bool
+    certain: bool
+    """Whether the one name has no doubt, such as an order above the band of the comparison."""
 
 
 Strategy = Callable[[Random, Scene, WinchAnswer], list[Situation]]
@@ -268,7 +270,8 @@ def played(seed: int, index: int, most: int) -> list[Outcome] | None:
                     return []
                 done = len(now.runs) - len(scene.runs)
                 if len(left) < 2 or done >= most or not answer.pairs:
-                    out.append(Outcome(name, done, left, scene.truth in left[:1]))
+                    is_certain = bool(steps) and steps[0].certain
+                    out.append(Outcome(name, done, left, scene.truth in left[:1], is_certain))
                     break
                 more = strategy(draws, now, answer)
                 now = replace(now, runs=(*now.runs, *more))
@@ -303,13 +306,14 @@ def main_of(arguments: Sequence[str]) -> int:
 
 
 def means(found: Sequence[Sequence[Outcome]], strategy: str) -> dict[str, float]:
-    """Runs until one name is left, and how often one was left and was right."""
+    """Runs until one name is left, how often one was left and was right, or wrong without doubt."""
     own = [outcome for case in found for outcome in case if outcome.strategy == strategy]
     return {
         "cases": len(own),
         "runs_mean": float(np.mean([outcome.runs for outcome in own])),
         "one_name": float(np.mean([len(outcome.left) == 1 for outcome in own])),
         "right": float(np.mean([outcome.right and len(outcome.left) == 1 for outcome in own])),
+        "certain_and_wrong": float(np.mean([o.certain and not o.right for o in own])),
     }
 
 

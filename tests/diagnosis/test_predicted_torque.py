@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from command_line import invoke
 from winchkit import compare, diagnose, read_profile, read_run
 from winchkit.arrays import Array
+from winchkit.runs import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
 
 JOINT = 'schema = 1\nkind = "axis"\nname = "joint"\n'
 HEADER = "time [s],motor_angle [rad],motor_torque [N m],predicted_torque [N m]"
@@ -103,6 +106,8 @@ def test_a_column_of_another_name_is_named(tmp_path: Path, way: str) -> None:
         ("tension=predicted_torque", "write motor_torque=COLUMN"),
         ("motor_torque", "write motor_torque=COLUMN"),
         ("motor_torque=motor_angle", "a unit of angle, not of torque"),
+        ("motor_torque=motor_torque", "'motor_torque' is measured; name the column of your model"),
+        ("motor_torque=time", "'time' is measured"),
     ],
 )
 def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, words: str) -> None:
@@ -110,3 +115,70 @@ def test_a_column_that_is_no_prediction_is_refused(tmp_path: Path, given: str, w
     result = invoke("compare", run, "-p", profile, "--predicted", given)
     assert result.exit_code in {2, 3}
     assert words in result.stderr
+
+
+def test_a_prediction_that_is_infinite_is_refused(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    first, last = run.read_text().rstrip().rsplit(",", 1)
+    run.write_text(f"{first},inf\n".replace("predicted_torque", "tau"))
+    assert last
+    result = invoke("compare", run, "-p", profile, "--predicted", "motor_torque=tau")
+    assert (result.exit_code, "column 'tau' is infinite" in result.stderr) == (3, True)
+
+
+def test_the_motion_is_not_simulated_without_the_model_of_its_prediction(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    profile.write_text(JOINT + '[motor]\ninertia = "1.9 kg m^2"\n')
+    for command in (["compare", run, "--forward"], ["forward", "--torque", run, "-o", "x.csv"]):
+        result = invoke(*command, *(["-p"] * (command[0] == "compare")), profile)
+        assert result.exit_code == 3
+        assert "no other motion can be simulated with it" in result.stderr
+
+
+def test_a_law_that_explains_no_more_than_a_simpler_one_but_predicts_better_is_a_step() -> None:
+    """Its set did not hold it, which ended in an internal error."""
+    time = np.arange(0.0, 20.0, 0.01)
+    angle, rate, _ = _rigid_body(time)
+    acceleration = -0.972 * np.sin(0.9 * time) - 2.116 * np.sin(2.3 * time)
+    torque = 2 * acceleration + 0.5 * rate
+    noise = 0.01 * np.random.default_rng(0).standard_normal(len(time))
+    channels = {
+        "motor_angle": Channel(angle, "rad"),
+        "motor_torque": Channel(torque + noise, "N m"),
+        "predicted_torque": Channel(1000 * torque, "N m"),
+    }
+    found = diagnose([Run("m", time, channels)], AxisProfile("joint")).diagnosis
+    assert found.steps[0].effects[0] == "spring-balancer"
+
+
+LINEAR = {"motor_angle [rad]": "position [m]", "torque [N m]": "force [N]", "motor_force": "force"}
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_joints_of_an_arm_are_axes_and_no_winches(tmp_path: Path, linear: bool) -> None:
+    run, profile = arm(tmp_path)
+    names, *rows = run.read_text().splitlines()
+    for rotary, own in LINEAR.items() if linear else ():
+        names = names.replace(rotary, own)
+    names = names.replace("predicted_torque", "tau_model")
+    options = () if linear else ("--predicted", "motor_torque=tau_model")
+    time, *own_names = names.split(",")
+    columns = [f"{joint}.{name}" for joint in ("A", "B") for name in own_names]
+    rows = [f"{row},{row.partition(',')[2]}" for row in rows]
+    run.write_text("\n".join([",".join([time, *columns]), *rows]))
+    profile.write_text(JOINT + 'motion = "linear"\n' * linear)
+    page, friction = tmp_path / "page.html", "force" if linear else "torque"
+    for command in ("compare", "diagnose"):
+        result = invoke(command, run, "-p", profile, "--winch", "all", "--html", page, *options)
+        assert "axis A\n" in result.stdout
+        assert "all 2 axes\n" in result.stdout
+        for text in (result.stdout, shown(page)):
+            assert not re.search(r"(?<!--)\bwinch(?!kit)", text, re.IGNORECASE)
+    assert f"in all 2, equal in size: {friction} = 1.19" in " ".join(result.stdout.split())
+    assert "has columns of A, B" in invoke("compare", run, "-p", profile).stderr
+
+
+def shown(page: Path) -> str:
+    """The words of a page."""
+    text = re.sub(r"<(style|script|pre).*?</\1>", "", page.read_text(encoding="utf-8"), flags=re.S)
+    return re.sub(r"<[^>]*>", " ", text)

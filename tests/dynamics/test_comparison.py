@@ -10,7 +10,7 @@ import pytest
 
 from simulated_profiles import AXIS, INERTIA, profile_of, torque_run
 from winchkit import forward
-from winchkit.dynamics.comparison import simulated_errors
+from winchkit.dynamics.comparison import simulated_errors, smoothed
 from winchkit.report.simulated import simulated_text
 from winchkit.runs import Channel
 
@@ -41,6 +41,25 @@ def test_open_loop_it_shows_nothing_once_the_initial_speed_errs_as_much(tmp_path
     assert found.meaningful_until is None
     lacking = 0.01 * run.time**2 / 2 * (1 / INERTIA - 1 / 5)
     assert found.rms == pytest.approx(np.sqrt(np.mean(lacking**2)), rel=0.05)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 1e-5, 1e-3])
+def test_the_initial_speed_errs_as_much_as_is_stated(tmp_path: Path, noise: float) -> None:
+    """The error of a true model is that of the initial speed, where differences are one-sided."""
+    true = profile_of(tmp_path, AXIS, ("motor-viscous", 'viscosity = "0.2 N m s"'))
+    time = np.arange(0, 4, 0.01)
+    torque = 1.5 * np.sin(1.3 * time) + np.sin(3.1 * time + 1)
+    run = forward(true, torque=torque_run(torque), initial_speed=0.3)
+    random, errors = np.random.default_rng(2), []
+    for _ in range(12):
+        noisy = run["motor_angle"] + noise * random.standard_normal(len(run))
+        measured = replace(run, channels={"motor_angle": Channel(noisy, "rad")})
+        speed, std = smoothed(measured, true).initial_rate
+        errors.append((speed - 0.3) / std)
+    assert 0.4 < np.sqrt(np.mean(np.square(errors))) < 1.6
+    channels = {"motor_angle": Channel(noisy, "rad"), "motor_torque": Channel(torque, "N m")}
+    (found,) = simulated_errors([replace(run, channels=channels)], true)
+    assert found.meaningful_until is not None
 
 
 def test_under_loops_the_reference_channel_is_followed(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The exported C is the line model to rounding, and the MuJoCo model moves as ``forward``."""
+"""The exported C, Python and JSON are the line model to rounding."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from simulated_profiles import AXIS, MASS, WINCH, profile_of, torque_run
-from winchkit import forward, load_catalogue
+from simulated_profiles import AXIS, profile_of
+from winchkit import load_catalogue
 from winchkit.dynamics.c_code import as_json, c_header, identifier
 from winchkit.dynamics.mjcf import mjcf
 from winchkit.dynamics.python_code import python_module
@@ -306,47 +307,20 @@ def test_the_json_has_every_formula(tmp_path: Path) -> None:
     assert {one["value"] for one in found["outputs"].values()} <= known
 
 
-@pytest.mark.parametrize("case", ["pendulum", "winch"])
-def test_mujoco_moves_as_forward(tmp_path: Path, case: str) -> None:
-    """A pendulum with dry friction, and a hanging load on a layered drum: 0.1 % of the motion."""
-    mujoco = pytest.importorskip("mujoco")
-    if case == "pendulum":
-        profile = profile_of(
-            tmp_path, AXIS,
-            ("joint-gravity", 'amplitude = "2 N m"\nphase = "0.3 rad"'),
-            ("drum-unbalance", 'amplitude = "0.5 N m"\nphase = "-1 rad"'),
-            ("motor-coulomb", 'torque = "0.05 N m"'),
-            ("motor-viscous", 'viscosity = "0.02 N m s"'),
-        )  # fmt: skip
-        torque, mass = 0.8 * np.sin(2 * np.arange(0, 5, 0.01)), None
-    else:
-        drum = 'kind = "archimedean"\nwinding_radius = "50 mm"\nlayer_growth = "2 mm"'
-        text = WINCH.replace(
-            'kind = "grooved"\nwinding_radius = "50 mm"\ngroove_pitch = "0 mm"', drum
-        )
-        profile = profile_of(
-            tmp_path, text,
-            ("motor-coulomb", 'torque = "0.02 N m"'), ("motor-viscous", 'viscosity = "1 mN m s"'),
-        )  # fmt: skip
-        torque, mass = 0.5 + 0.1 * np.sin(2 * np.arange(0, 4, 0.01)), MASS
-    run = forward(profile, torque=torque_run(torque), load_mass=mass, initial_speed=0.0)
-    text, missing = mjcf(profile, terms_of(profile), mass)
-    assert not missing
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
-    angle = [0.0]
-    for now in run.time[1:]:
-        while data.time < now - model.opt.timestep / 2:
-            data.ctrl[0] = np.interp(data.time, run.time, torque)
-            mujoco.mj_step(model, data)
-        angle.append(data.joint("machine").qpos[0] * profile.gearbox.ratio)
-    assert np.max(np.abs(angle - run["motor_angle"])) < 1e-3 * np.ptp(run["motor_angle"])
+@pytest.mark.parametrize("name", ["none", "a */ b", 'my "joint" <1>', "größe", "2", "a--b\\"])
+def test_names_of_a_profile_break_no_text(tmp_path: Path, name: str) -> None:
+    quoted = json.dumps(name, ensure_ascii=False)
+    profile = profile_of(tmp_path, AXIS.replace('name = "axis"', f"name = {quoted}"))
+    compile(python_module(profile, terms_of(profile)), "model.py", "exec")
+    ElementTree.fromstring(mjcf(profile, terms_of(profile))[0])
+    header = tmp_path / "model.h"
+    header.write_text(c_header(profile, terms_of(profile)))
+    if GCC:
+        command = [GCC, *FLAGS, "-x", "c", "-fsyntax-only", str(header)]
+        subprocess.run(command, check=True, capture_output=True)
 
 
-def test_a_profile_without_masses_is_refused(tmp_path: Path) -> None:
-    bare = profile_of(tmp_path, AXIS.partition("[motor]")[0])
-    with pytest.raises(UsageError, match="no mass that MuJoCo could move"):
-        mjcf(bare, [])
-    winch = profile_of(tmp_path, WINCH)
-    with pytest.raises(UsageError, match="give --load-mass"):
-        mjcf(winch, terms_of(winch))
+def test_an_infinite_constant_is_written(tmp_path: Path) -> None:
+    stiff = used(EFFECTS["cable-elongation-linear"])
+    rigid = replace(stiff, values=dict.fromkeys(stiff.values, np.inf))
+    exec(python_module(machine(tmp_path), [rigid]), {})

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from command_line import invoke
 from simulated_profiles import (
     ARM,
     AXIS,
@@ -31,11 +32,19 @@ from winchkit.effects import Effect, Values
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
-from winchkit.errors import RunError, UsageError
+from winchkit.errors import FileError, RunError, UsageError
 from winchkit.model.stages import At
+from winchkit.runs import write_run
 from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.bench import hiding, profiles_of
+
+GAINS = """
+[control]
+position_gain = "25 1/s"
+velocity_gain = "0.05 N m s"
+integral_time = "20 ms"
+"""
 
 
 def test_a_mass_on_a_spring_oscillates_as_in_closed_form(tmp_path: Path) -> None:
@@ -188,13 +197,7 @@ def test_the_simulated_bench_moves_alike_to_one_percent(tmp_path: Path) -> None:
 
 
 def test_the_loops_follow_a_programme_and_its_torque_repeats_the_motion(tmp_path: Path) -> None:
-    control = """
-[control]
-position_gain = "25 1/s"
-velocity_gain = "0.05 N m s"
-integral_time = "20 ms"
-"""
-    profile = profile_of(tmp_path, WINCH + control, ("motor-coulomb", 'torque = "20 mN m"'))
+    profile = profile_of(tmp_path, WINCH + GAINS, ("motor-coulomb", 'torque = "20 mN m"'))
     programme = Programme("up", (
         ProgrammeStep(hold=0.2),
         ProgrammeStep(to=3.0, speed=0.5, acceleration=0.8),
@@ -231,6 +234,56 @@ def test_wrong_inputs_have_one_sentence(
     with pytest.raises((RunError, UsageError), match=said) as raised:
         forward(profile, **arguments)
     assert "\n" not in str(raised.value)
+
+
+def moves(*steps: tuple[str, float]) -> Programme:
+    each = (ProgrammeStep(winch=w, to=to, speed=0.2, acceleration=0.5) for w, to in steps)
+    return Programme("p", (ProgrammeStep(hold=0.5), *each))
+
+
+def test_a_programme_begins_where_it_ends_whatever_its_first_step_is(tmp_path: Path) -> None:
+    profile = profile_of(tmp_path, WINCH + GAINS)
+    run = forward(profile, programme=moves(("A", 3.0), ("A", 2.0)), load_mass=MASS)
+    assert run["cable_length"][0] == pytest.approx(2.0)
+    assert np.ptp(run["cable_length"]) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("programme", "arguments", "said"),
+    [
+        (moves(("A", 3.0), ("B", 2.0)), {}, "moves A, B, and one winch is simulated"),
+        (moves(("A", 3.0)), {"initial_speed": 1.0}, "starts from rest"),
+        (moves(("A", 3.0)), {"load_mass": -1.0}, "load_mass=-1 is not a positive number"),
+    ],
+)
+def test_a_programme_of_another_machine_is_refused(
+    tmp_path: Path, programme: Programme, arguments: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(UsageError, match=said):
+        forward(profile_of(tmp_path, WINCH + GAINS), programme=programme, **arguments)
+
+
+def test_a_cable_that_is_wound_in_ends_the_simulation(tmp_path: Path) -> None:
+    pulled = torque_run(np.full(400, 1.5))
+    with pytest.raises(UsageError, match=r"all of the cable is wound in at 1\.\d+ s"):
+        forward(profile_of(tmp_path, WINCH), torque=pulled, load_mass=MASS, initial_speed=0.0)
+
+
+@pytest.mark.parametrize("speed", ["0", "1 m/s", "inf rad/s", "1e400 rad/s", ""])
+def test_an_initial_speed_that_is_none_is_named(tmp_path: Path, speed: str) -> None:
+    profile_of(tmp_path, AXIS)
+    write_run(torque_run(np.zeros(10)), tmp_path / "run.csv")
+    options = ["--torque", tmp_path / "run.csv", "-o", tmp_path / "out.csv"]
+    result = invoke("forward", tmp_path / "machine.toml", *options, "--initial-speed", speed)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("winchkit: --initial-speed: ")
+
+
+def test_an_infinite_value_is_refused(tmp_path: Path) -> None:
+    effect = ("rotor-inertia", 'inertia = "inf kg m^2"')
+    bare = AXIS.partition("[motor]")[0]
+    with pytest.raises(FileError, match=r"'inf kg m\^2' must be finite"):
+        forward(profile_of(tmp_path, bare, effect), torque=torque_run(np.ones(10)))
 
 
 def stepless(torque: NDArray[np.float64], at: At, values: Values) -> NDArray[np.float64]:

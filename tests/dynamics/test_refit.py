@@ -174,6 +174,9 @@ def test_missing_torque_at_the_ends_is_cut_and_a_long_gap_is_named(tmp_path: Pat
     assert error.rms < 0.05
     with pytest.raises(RunError, match=r"motor_torque: no value for 0\.21 s from 5\.99 s on"):
         simulated_errors([without(slice(600, 620))], profile)
+    late = replace(run, time=run.time + 5 * (np.arange(len(run)) > 599))
+    with pytest.raises(RunError, match=r"motor_torque: no value for 5\.01 s from 5\.99 s on"):
+        simulated_errors([late], profile)
 
 
 def test_the_command_writes_the_values_of_the_motion(tmp_path: Path) -> None:

@@ -21,14 +21,19 @@ from winchkit.schema.profiles.winch import WinchProfile
 T = TypeVar("T")
 _AS_GIVEN = {"run", "runs", "path", "programme", "profile", "effect", "effects", "code"}
 """Fields with names of the user and of the catalogue."""
+_AXIS = {"winch": "axis", "winches": "axes", "Winch": "Axis", "Winches": "Axes"}
+_WINCH = re.compile(r"(?<![-\w./'\"])[Ww]inch(?:es)?(?![-\w/\"]|\.\w|&quot;)")
+"""The word in a text; no option, file or key of that name."""
+_DRUM = re.compile(r"\bdrum(?=\s+(?:angle|turn)\b)")
 
 
 def in_units_of(profile: WinchProfile, result: T) -> T:
     """A result with the names and units of a profile: those of a linear axis where it is one; in
-    texts on another axis "output" replaces "drum".
+    texts on an axis "axis" replaces "winch", and "output" the "drum" of one that turns.
     """
-    if isinstance(profile, AxisProfile) and isinstance(result, str) and not profile.is_linear:
-        return cast(T, re.sub(r"\bdrum(?=\s+(?:angle|turn)\b)", "output", result))
+    if isinstance(profile, AxisProfile) and isinstance(result, str):
+        text = _WINCH.sub(lambda found: _AXIS[found[0]], result)
+        result = cast(T, text if profile.is_linear else _DRUM.sub("output", text))
     return _linear(result) if profile.is_linear else result
 
 

@@ -154,6 +154,15 @@ def balance(
     return Balance(accelerated, own, load, weight, tuple(rates), tuple(tracer.states.values()))
 
 
+def refuse_load(profile: WinchProfile, terms: Iterable[Term], load_mass: float) -> None:
+    """Raise UsageError for a load, kg, on an axis that carries none."""
+    if isinstance(profile, AxisProfile) and not any("payloads" in t.effect.needs for t in terms):
+        raise UsageError(
+            f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
+            "would hang on it: leave the load out, or add the effect joint-payload"
+        )
+
+
 def _vanishes(term: Term) -> bool:
     """Whether the first amplitude is at its null: there is no memory then."""
     first = next(p for p in term.effect.parameters if p.role == "amplitude")

@@ -103,11 +103,12 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
     """The header of a profile; raises UsageError as :func:`~winchkit.dynamics.step.step_of`."""
     p = identifier(profile.name)
     step = step_of(profile, terms, p)
-    fields = {"p": p, "P": p.upper(), "name": profile.name}
+    fields = {"p": p, "P": p.upper(), "name": in_comment(profile.name)}
     out = [_HEAD.format(**fields)]
     for c in step.constants:
         value = c_literal(c.value, p)
-        out.append(f"#define {p.upper()}_{c.name.upper()} {value} /* {c.unit}; {c.source} */\n")
+        what = f"{c.unit}; {in_comment(c.source)}"
+        out.append(f"#define {p.upper()}_{c.name.upper()} {value} /* {what} */\n")
     inputs = inputs_of(profile)
     members = {name: told for name, *told in inputs.values()}
     out += [_struct(p, "input", members), _struct(p, "output", outputs_of(profile))]
@@ -136,6 +137,11 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
             settled=_SETTLED,
         ))  # fmt: skip
     return "".join([*out, "#endif\n"])
+
+
+def in_comment(name: str) -> str:
+    """A name of a profile, which may end no comment of C."""
+    return name.replace("*/", "* /")
 
 
 def identifier(name: str) -> str:

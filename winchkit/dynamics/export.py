@@ -8,6 +8,7 @@ from typing import Literal
 
 from winchkit import wings
 from winchkit.arguments import positive, require_type
+from winchkit.dynamics.balance import refuse_load
 from winchkit.dynamics.c_code import as_json, c_header
 from winchkit.dynamics.mjcf import mjcf
 from winchkit.dynamics.python_code import python_module
@@ -45,7 +46,7 @@ def export_model(
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional
-        Mass on the cable of a winch, kg, for MuJoCo.
+        Mass on the cable of a winch, or payload of an axis, kg, for MuJoCo.
 
     Returns
     -------
@@ -66,6 +67,9 @@ def export_model(
     terms = terms_of(profile, catalogue)
     if load_mass is not None:
         load_mass = positive("export_model", "load_mass", load_mass)
+        refuse_load(profile, terms, load_mass)
+        if to != "mjcf":
+            raise UsageError(f"'{to}' has the load as an input: leave the load mass out")
     if to == "c":
         return ExportedModel(c_header(profile, terms))
     if to == "python":

@@ -9,7 +9,7 @@ import numpy as np
 
 from winchkit.arguments import number, positive, require_type
 from winchkit.arrays import Array
-from winchkit.dynamics.balance import balance
+from winchkit.dynamics.balance import balance, refuse_load
 from winchkit.dynamics.drives import RECORDED, Inputs, cascade
 from winchkit.dynamics.integration import Integrator, SimulatedMotion, holding_torque
 from winchkit.effects.bind import terms_of
@@ -20,12 +20,13 @@ from winchkit.model.line import Line
 from winchkit.model.line import Motion as LineMotion
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import JERK_TIME, plan
+from winchkit.runs.gaps import lost_samples
 from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.linear_axis import CHANNELS, UNITS
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.programme import Programme
+from winchkit.schema.programme import ALL, Programme
 from winchkit.units import GRAVITY
 
 _COARSEST = 0.01
@@ -90,7 +91,7 @@ def forward(
     ------
     UsageError
         For none or several of the three sources, effects without a step, a profile without inertia
-        or without gains, and a cable that becomes slack.
+        or without gains, a programme of several winches, and a cable that becomes slack or ends.
     RunError
         For a run without torque or initial speed, or with missing values.
 
@@ -102,26 +103,20 @@ def forward(
     """
     require_type(profile, WinchProfile, "profile")
     tolerance = positive("forward", "tolerance", tolerance, _COARSEST)
-    if load_mass is not None:
-        load_mass = positive("forward", "load_mass", load_mass)
+    terms = terms_of(profile, catalogue)
     if initial_speed is not None:
         initial_speed = number("forward", "initial_speed", initial_speed)
-    terms = terms_of(profile, catalogue)
-    if (
-        load_mass is not None
-        and isinstance(profile, AxisProfile)
-        and not any("payloads" in term.effect.needs for term in terms)
-    ):
-        raise UsageError(
-            f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
-            "would hang on it: leave the load out, or add the effect joint-payload"
-        )
+    if load_mass is not None:
+        load_mass = positive("forward", "load_mass", load_mass)
+        refuse_load(profile, terms, load_mass)
     sources = {"programme": programme, "torque": torque, "reference": reference}
     given = [name for name, source in sources.items() if source is not None]
     if len(given) != 1:
         had = " and ".join(given) or "none"
         raise UsageError(f"give one of a programme, a torque and a reference; there is {had}")
     if programme is not None:
+        if initial_speed is not None:
+            raise UsageError("a programme starts from rest: leave the initial speed out")
         setup = _of_programme(profile, terms, programme, load_mass, rate)
     else:
         run = torque if torque is not None else reference
@@ -237,6 +232,12 @@ def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
     to the last sample at which all is known; short gaps are straight lines. Raises RunError for
     fewer than two samples and for a longer gap."""
     (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+    if "predicted_torque" in run:
+        message = (
+            "has the torque of another model, which is known along the measured motion only: no "
+            "other motion can be simulated with it; leave that column out"
+        )
+        raise RunError(Fault(message, run.path or run.name))
     used = {_driving(run, is_torque=is_torque), "motor_angle", "motor_velocity"}
     if not isinstance(profile, AxisProfile) and run.load_mass is None:
         used.add("load")
@@ -260,7 +261,7 @@ def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:
     for name, whole in own.items():
         values = whole[kept]
         there = np.flatnonzero(np.isfinite(values))
-        gaps = np.where(np.diff(there) > 1, np.diff(time[there]), 0.0)
+        gaps = np.where(lost_samples(time[there]), np.diff(time[there]), 0.0)
         longest = int(np.argmax(gaps))
         if gaps[longest] > _BRIDGED:
             message = (
@@ -294,9 +295,15 @@ def _of_programme(
             f"profile '{profile.name}' is an axis, and a motion programme has cable lengths: give "
             "--reference RUN with the motor angles to follow"
         )
+    winches = sorted({step.winch for step in programme.step} - {ALL})
+    if len(winches) > 1:
+        raise UsageError(
+            f"programme '{programme.name}' moves {', '.join(winches)}, and one winch is simulated: "
+            "leave the steps of the others out"
+        )
     if not 0.0 < rate <= 1 / _REFERENCE_STEP:
         raise UsageError(f"rate {rate:g} Hz must be above 0 and at most {1 / _REFERENCE_STEP:g} Hz")
-    ends = programme.approach(programme.step[0].winch)
+    ends = programme.approach(*winches or [ALL])
     here = ends[-1] if ends else profile.reference.cable_length or 0.0
     mass = load_mass
     lengths, speeds = [np.array([here])], [np.zeros(1)]
@@ -330,7 +337,8 @@ def _of_programme(
     every = np.arange(0.0, time[-1], 1 / rate)
     if len(every) < 2:
         raise UsageError(
-            f"programme '{programme.name}' has no move and no hold under its first load"
+            f"programme '{programme.name}' has no move and no hold under its first load, "
+            f"from where it ends, {here:g} m"
         )
     inputs = Inputs(time, {"goal": angle, "goal_speed": -paid_out / arm})
     return Setup(f"{programme.name}-forward", every, float(angle[0]), 0.0, inputs, mass)
@@ -370,6 +378,12 @@ def _readings(
     line = Line(profile, modifiers_of(terms))
     predicted = line.predict(replace(measured, load=motion.load if setup.has_load else None))
     out["cable_length"] = Channel(predicted["cable_length"], "m")
+    wound = np.flatnonzero(predicted["cable_length"] < 0.0)
+    if len(wound) and profile.reference.cable_length is not None:
+        raise UsageError(
+            f"all of the cable is wound in at {motion.time[wound[0]]:.4g} s: its free length would "
+            "be below 0 from there on; cut the run there, or check its torque and load"
+        )
     if setup.has_load:
         out["load"] = Channel(motion.load, "N")
         out["tension"] = Channel(predicted["tension"], "N")

@@ -32,7 +32,8 @@ SMALL = 1e-9
 """kg and kg m²: of a body whose inertia is the armature of its joint; MuJoCo refuses zero."""
 _Attributes = Mapping[str, complex]
 Law = Callable[[Mapping[str, float], float], _Attributes]
-"""Attributes of the joint from the values of an effect (rotary names) and the gear ratio."""
+"""Attributes of the joint from the values of an effect (rotary names, and the ``load`` of an axis,
+kg) and the gear: motor turns per turn of the joint, negative where they turn against each other."""
 
 
 def _damping(v: Mapping[str, float], i: float) -> _Attributes:
@@ -40,17 +41,26 @@ def _damping(v: Mapping[str, float], i: float) -> _Attributes:
 
 
 def _spring(v: Mapping[str, float], i: float) -> _Attributes:
-    reference = -v["torque"] / v["stiffness"] if v["stiffness"] else 0.0
-    return {"stiffness": v["stiffness"] * i, "springref": reference}
+    return {"stiffness": v["stiffness"] * i, "springref": -v["torque"] / v["stiffness"]}
+
+
+def _weight(v: Mapping[str, float], i: float) -> _Attributes:
+    return {"gravity": rect(v["amplitude"] * i, v["phase"])}
+
+
+def _payload(v: Mapping[str, float], _: float) -> _Attributes:
+    inertia = v["load"] * v["lever"] ** 2
+    return {"gravity": rect(v["load"] * GRAVITY * v["lever"], v["phase"]), "armature": inertia}
 
 
 COUNTERPARTS: Mapping[str, Law] = {
     "rotor-inertia": lambda v, i: {"armature": v["inertia"] * i * i},
     "motor-viscous": _damping,
-    "motor-coulomb": lambda v, i: {"frictionloss": v["torque"] * i},
+    "motor-coulomb": lambda v, i: {"frictionloss": v["torque"] * abs(i)},
     "spring-balancer": _spring,
-    "joint-gravity": lambda v, i: {"gravity": rect(v["amplitude"] * i, v["phase"])},
-    "drum-unbalance": lambda v, i: {"gravity": rect(v["amplitude"] * i, v["phase"])},
+    "joint-gravity": _weight,
+    "drum-unbalance": _weight,
+    "joint-payload": _payload,
 }
 """Effects with the same law in MuJoCo; ``gravity`` is the torque of a body that hangs on the joint,
 as amplitude and phase of a complex number."""
@@ -71,14 +81,17 @@ class MujocoJoint:
 
 
 def joint_of(
-    profile: WinchProfile, terms: Sequence[Term], elsewhere: Collection[str] = ()
+    profile: WinchProfile,
+    terms: Sequence[Term],
+    elsewhere: Collection[str] = (),
+    load_mass: float | None = None,
 ) -> MujocoJoint:
-    """The joint of a profile with its effects, but for those ``elsewhere``; raises UsageError for a
-    profile without masses."""
+    """The joint of a profile with its effects, but for those ``elsewhere``, and with the load that
+    it carries, kg; raises UsageError for a profile without masses or the load."""
     found: dict[str, complex] = {}
     missing: list[str] = []
     comments: list[str] = []
-    ratio = profile.gearbox.ratio
+    gear = profile.gearbox.ratio * profile.gearbox.direction
     fitted = {table.id: table.values.get("fitted") for table in profile.effect}
     for term in terms:
         if (std := _std(fitted.get(term.effect.id))) is not None:
@@ -87,11 +100,15 @@ def joint_of(
             continue
         law = COUNTERPARTS.get(term.effect.id)
         values = {_ROTARY.get(name, name): value for name, value in term.values.items()}
-        if law is None or values.get(TRANSITION, 0.0) != 0.0:
-            more = " with a transition" if law is not None else ""
+        if law is None or values.get(TRANSITION, 0.0) != 0.0 or values.get("stiffness") == 0.0:
+            more = " with a transition" if law is not None and TRANSITION in values else ""
             missing.append(f"{term.label}{more}")
             continue
-        for name, value in law(values, ratio).items():
+        if "payloads" in term.effect.needs:
+            if load_mass is None:
+                raise UsageError(f"effect '{term.label}' needs the load: give --load-mass")
+            values["load"] = load_mass
+        for name, value in law(values, gear).items():
             found[name] = found.get(name, 0.0) + value
     gravity = found.pop("gravity", 0j)
     attributes = {name: value.real for name, value in found.items()}
@@ -105,15 +122,15 @@ def joint_of(
     joint = " ".join(f'{name}="{value:.17g}"' for name, value in attributes.items() if value)
     if attributes.get("frictionloss"):
         joint += f' solreffriction="{_STIFF}"'
-    return MujocoJoint(joint, body, ratio * profile.gearbox.direction, missing, comments)
+    return MujocoJoint(joint, body, gear, missing, comments)
 
 
 def mjcf(
     profile: WinchProfile, terms: Sequence[Term], load_mass: float | None = None
 ) -> tuple[str, list[str]]:
     """The model, and what it lacks of the profile; raises UsageError for a profile without masses,
-    and for a winch without a load (kg)."""
-    joint = joint_of(profile, terms)
+    and for a winch, or an axis with a payload, without a load (kg)."""
+    joint = joint_of(profile, terms, load_mass=load_mass)
     missing = joint.missing
     is_axis = isinstance(profile, AxisProfile)
     if not is_axis and load_mass is None:
@@ -146,8 +163,10 @@ def mujoco_head(name: str, comments: Sequence[str], missing: Sequence[str]) -> s
     lines = (*comments, *(f"no counterpart here: {one}" for one in missing))
     listed = "".join(f"\n  {escape(line)}" for line in lines)
     head = f"{escape(name)}: written by winchkit export-model; SI units, the control is"
+    # A comment of XML holds no two hyphens in a row.
+    comment = f"{head} the motor's torque.{listed}".replace("--", "- -").replace("--", "- -")
     return f"""\
-<!-- {head} the motor's torque.{listed}
+<!-- {comment}
 -->
 <mujoco model={quoteattr(name)}>
   <compiler angle="radian" autolimits="true"/>

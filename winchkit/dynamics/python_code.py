@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Sequence
+from keyword import iskeyword
 
 from winchkit.dynamics.c_code import identifier
 from winchkit.dynamics.expression import over, power, root, sign, statements
@@ -69,13 +70,13 @@ def python_module(profile: WinchProfile, terms: Sequence[Term]) -> str:
         results = "result" if len(outputs) > 1 else "result[0]"
     else:
         results = ", ".join(found[: len(outputs)])
-    text = "\n".join(body)
-    used = set(re.findall(r"\w+", text))
+    text, name = "\n".join(body), identifier(profile.name).title().replace("_", "")
+    used = {*re.findall(r"\w+", text), *(repr(c.value) for c in step.constants)}
     called = [name for name in _FUNCTIONS if name in used]
     told = [f"{name}, {unit}" for name, (unit, _) in outputs.items()]
     return _MODULE.format(
         title=re.sub(r'["\\]', "", profile.name),
-        name=identifier(profile.name).title().replace("_", ""),
+        name=f"{name}_" if iskeyword(name) else name,
         constants="\n".join(
             f"{c.name.upper()} = {c.value!r}  # {c.unit}; {c.source}" for c in step.constants
         ),

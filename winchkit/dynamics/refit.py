@@ -28,7 +28,7 @@ from scipy.optimize import least_squares
 from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
 from winchkit.dynamics.balance import ON_MOTION, balance
-from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed_rate
+from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed
 from winchkit.dynamics.drives import Inputs
 from winchkit.dynamics.forward import Setup, driving_part, motion_of, setup_of
 from winchkit.effects.parametrization import Coordinates
@@ -159,10 +159,10 @@ class _WholeRun:
     def of(cls, run: Run, profile: WinchProfile) -> _WholeRun:
         """Raises RunError as :func:`forward`."""
         own = driving_part(run, profile, is_torque=True)
-        rate, rate_noise = smoothed_rate(own, profile)
-        setup = setup_of(profile, run, None, float(rate[0]), is_torque=True)
-        angle_noise = local_noise(own["motor_angle"])
-        return cls(own, setup, rate, (max(angle_noise, _EXACT), max(rate_noise, _EXACT)))
+        clock = smoothed(own, profile)
+        setup = setup_of(profile, run, None, float(clock.rate[0]), is_torque=True)
+        noise = local_noise(own["motor_angle"]), clock.rate_noise
+        return cls(own, setup, clock.rate, (max(noise[0], _EXACT), max(noise[1], _EXACT)))
 
     def pieces(self, profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
         """Stretches that are fitted: one where effects have states that no instrument reads."""
@@ -295,7 +295,8 @@ class _Shooting:
             ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
         )  # fmt: skip
         covariance = self._covariance(np.asarray(found.jac), found.fun)
-        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))[:count]
+        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        fitted_speeds = deviations[count + 1 :: 2]
         terms, std, place = self.terms_at(found.x[:count]), list[dict[str, float]](), 0
         for index, term in enumerate(self.terms):
             own = Coordinates(term.effect)
@@ -307,7 +308,7 @@ class _Shooting:
             place += len(own)
         return MotionFit(
             terms, tuple(std), self.errors(self.terms, self.states_of_data),
-            self.errors(terms, self.states_at(found.x)), found.status > 0,
+            self.errors(terms, self.states_at(found.x), fitted_speeds), found.status > 0,
         )  # fmt: skip
 
     @cached_property
@@ -322,15 +323,19 @@ class _Shooting:
         """Initial angle and speed of every piece as measured, (pieces, 2)."""
         return np.array([(piece.setup.angle, piece.setup.speed) for piece in self.pieces])
 
-    def errors(self, terms: Sequence[Term], states: Array) -> tuple[SimulatedError, ...]:
-        """Errors of the whole runs simulated from the states (pieces, 2) at their beginnings."""
-        begun = [state for piece, state in zip(self.pieces, states, strict=True) if piece.is_first]
+    def errors(
+        self, terms: Sequence[Term], states: Array, speed_std: Array | None = None
+    ) -> tuple[SimulatedError, ...]:
+        """Errors of the whole runs simulated from the states (pieces, 2) at their beginnings, whose
+        speeds have the deviations ``speed_std`` (pieces,) or those of the measurement."""
+        first = [k for k, piece in enumerate(self.pieces) if piece.is_first]
         return tuple(
             open_loop_error(
                 self.profile, terms, one.run,
-                replace(one.setup, angle=float(angle), speed=float(speed)), one.noise[1],
+                replace(one.setup, angle=float(states[k, 0]), speed=float(states[k, 1])),
+                one.noise[1] if speed_std is None else float(speed_std[k]),
             )
-            for one, (angle, speed) in zip(self.whole, begun, strict=True)
+            for one, k in zip(self.whole, first, strict=True)
         )  # fmt: skip
 
     def _residual_at(self, x: Array) -> Array:

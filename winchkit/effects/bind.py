@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import isfinite
 
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
@@ -98,4 +99,6 @@ def _quantity(raw: object, parameter: Parameter) -> float:
         raise UsageError(
             f"'{raw}' lies outside {parameter.low:g} to {parameter.high:g} {parameter.unit}"
         )
+    if not (isfinite(value) or value == parameter.null):
+        raise UsageError(f"'{raw}' must be finite")
     return value

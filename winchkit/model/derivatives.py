@@ -158,6 +158,16 @@ class SamplingTimes:
         return self.smoother.typical_std(1 if self.measured_rate is None else 0)
 
     @cached_property
+    def initial_rate(self) -> tuple[float, float]:
+        """Rate at the first sample and its standard deviation, by the smoothing spline: differences
+        are one-sided there, and any derivative has more noise than between its neighbours."""
+        moved, order = self._moved, 1 if self.measured_rate is None else 0
+        if moved is None or len(self.time) < _LEAST_SAMPLES or not np.ptp(moved):
+            return float(self.rate[0]), self.rate_noise
+        smoother = self.smoother or SmoothingSpline.fit(self.time, moved)
+        return float(smoother.smoothed(moved, order)[0]), float(smoother.std(order)[0])
+
+    @cached_property
     def acceleration(self) -> Array:
         """Second derivative of the angle, (n,)."""
         if self.smoother is None:

@@ -12,6 +12,7 @@ from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.rendering import Plotted
 from winchkit.runs.channel_values import is_real, real_numbers
 from winchkit.runs.gaps import gap_lengths
+from winchkit.schema.linear_axis import rotary_name
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse
 
@@ -125,13 +126,10 @@ class Run(Plotted, Tabular):
         return len(gap_lengths(self.time, {name: self[name] for name in self}))
 
     def winches(self) -> list[str]:
-        """Names of the winches, from columns ``A.motor_angle``; ``[""]`` without prefixes."""
-        prefixes = [
-            name.rpartition(".")[0]
-            for name in self.channels
-            if name.rpartition(".")[2] == "motor_angle"
-        ]
-        return prefixes or [""]
+        """Names of the winches or axes, from columns ``A.motor_angle`` or ``A.position``; ``[""]``
+        without prefixes."""
+        parts = [name.rpartition(".") for name in self.channels]
+        return [name for name, _, end in parts if rotary_name(end) == "motor_angle"] or [""]
 
     def of_winch(self, winch: str) -> Run:
         """The run of one winch: its columns without prefix, the shared ones kept.
@@ -150,8 +148,8 @@ class Run(Plotted, Tabular):
             return self
         if winch not in self.winches():
             known = [name for name in self.winches() if name]
-            there = f"its winches are {', '.join(known)}" if known else "its columns name no winch"
-            message = f"no winch '{winch}' in it; {there}" + suggest(winch, known)
+            there = f"it has {', '.join(known)}" if known else "its columns name none"
+            message = f"no winch or axis '{winch}' in it; {there}" + suggest(winch, known)
             raise RunError(Fault(message, self.path or self.name))
         own = {
             name.removeprefix(f"{winch}."): channel

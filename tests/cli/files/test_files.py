@@ -163,7 +163,7 @@ def test_what_export_refuses(run: Path, tmp_path: Path) -> None:
     for arguments, code, part in (
         ((run, "-o", tmp_path / "a.txt"), 2, "no format of a run"),
         ((run, "-o", tmp_path / "none" / "a.csv"), 3, "cannot be written"),
-        ((run, "-o", tmp_path / "a.csv", "--winch", "C"), 3, "its winches are A, B"),
+        ((run, "-o", tmp_path / "a.csv", "--winch", "C"), 3, "it has A, B"),
         ((tmp_path / "none.csv", "-o", tmp_path / "a.csv"), 3, "no such file"),
         ((run,), 2, "Missing option"),
     ):

@@ -238,16 +238,16 @@ def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     write_run(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
     result = done("compare", both, "-p", "bench-spiral", "--json", code=2)
     assert result.stdout == ""
-    assert "has the winches A, B; choose one with --winch" in result.stderr
+    assert "has columns of A, B; choose one with --winch" in result.stderr
     one = answer("compare", both, "-p", "bench-spiral", "--winch", "A")["outputs"]
     alone = answer("compare", runs[0], "-p", "bench-spiral")["outputs"]
     assert one["tension"]["rms"] == pytest.approx(alone["tension"]["rms"], rel=1e-6)
     assert one != answer("compare", both, "-p", "bench-spiral", "--winch", "B")["outputs"]
     wrong = done("compare", both, "-p", "bench-spiral", "--winch", "C", code=2)
-    assert "no winch 'C'; it has A, B" in wrong.stderr
+    assert "no winch or axis 'C'; it has A, B" in wrong.stderr
     other = invoke("compare", runs[0], "-p", "bench-spiral", "--winch", "B")
     assert (other.exit_code, other.stdout) == (2, ""), "its metadata name winch A"
-    assert "no winch 'B'; it has A" in other.stderr
+    assert "no winch or axis 'B'; it has A" in other.stderr
 
 
 @pytest.fixture(scope="module")
@@ -322,7 +322,7 @@ def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> N
     write_run(replace(run, channels=odd), path)
     asked = ("compare", path, "-p", "bench-spiral", "--winch", "all")
     refused = done(*asked, "--html", tmp_path / "o.html", code=2)
-    assert "no page for each of the winches" in refused.stderr
+    assert "no page for each of" in refused.stderr
     assert list(answer(*asked)["winches"]) == ["x y", "x-y"]
 
 

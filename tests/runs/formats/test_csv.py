@@ -108,7 +108,7 @@ def test_several_winches(file: Path) -> None:
     only = run.of_winch("B")
     assert set(only) == {"motor_angle", "tension", "room"}
     assert only["motor_angle"].tolist() == [2.0, 6.0]
-    with pytest.raises(RunError, match="its winches are A, B"):
+    with pytest.raises(RunError, match="it has A, B"):
         run.of_winch("C")
     with pytest.raises(RunError, match=r"no column 'tensio'.*did you mean 'tension'"):
         only["tensio"]

@@ -57,10 +57,11 @@ def echo_json(value: object) -> None:
     click.echo(to_json(value))
 
 
-def echo_each(texts: Mapping[str, str], overview: str) -> None:
-    """Print a text for every winch under its name, and last, where one looks, all at a glance."""
+def echo_each(texts: Mapping[str, str], overview: str, kind: str) -> None:
+    """Print a text for every winch or axis (``kind``) under its name, and last, where one looks,
+    all at a glance."""
     for name, text in texts.items():
-        click.echo(f"winch {name}\n{text}\n" if name else text)
+        click.echo(f"{kind} {name}\n{text}\n" if name else text)
     if len(texts) > 1:
         click.echo(overview)
 

@@ -36,7 +36,12 @@ from winchkit.cli.core.options import (
     type=click.Choice(["c", "python", "mjcf", "json"]),
     help="A header in C99, a Python module, a model of MuJoCo, or the formulas as JSON.",
 )
-@quantity_option("--load-mass", of="mass", example="10 kg", help="Mass on the cable, for MuJoCo.")
+@quantity_option(
+    "--load-mass",
+    of="mass",
+    example="10 kg",
+    help="Mass on the cable or payload of an axis, for MuJoCo.",
+)
 @effects_option
 @output_option("File to write; by default standard output.")
 @replace_option

@@ -70,7 +70,8 @@ def command(
     declared = declared_profile(asked.source)
     refuse_options(declared, asked.band, asked.winch)
     if is_simulated and (asked.each or not isinstance(declared, WinchProfile)):
-        raise UsageError("--forward simulates one winch or axis; choose one with --winch")
+        which = "; choose one with --winch" if asked.each else ", not a robot"
+        raise UsageError(f"--forward simulates one winch or axis{which}")
     if asked.each and isinstance(declared, WinchProfile):
         wings.part("fleet", "compare_command")(runs, declared, asked, html, figures)
         return

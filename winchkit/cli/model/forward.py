@@ -67,7 +67,7 @@ def command(
     table [control]. Friction sticks and slips, and backlash opens and closes, at exact times.
     """
     from winchkit.catalog import find
-    from winchkit.cli.core.quantities import quantity
+    from winchkit.cli.core.quantities import check_typed, quantity
     from winchkit.dynamics.forward import forward
     from winchkit.effects import load_catalogue
     from winchkit.runs import read_run, write_run
@@ -75,11 +75,14 @@ def command(
     from winchkit.runs.info import summary_of
     from winchkit.schema.read import read_profile, read_programme
     from winchkit.sim.bench import programme_path
-    from winchkit.units import parse
 
     refuse_existing(Path(output), replace)
     declared = read_profile(find("profiles", profile))
-    dimension = "speed" if declared.is_linear else "angular speed"
+    speed = None
+    if initial_speed is not None:
+        dimension = "speed" if declared.is_linear else "angular speed"
+        check_typed("--initial-speed", initial_speed, dimension)
+        speed = quantity(initial_speed, dimension)
     with progress_bar() as progress:
         progress("integrating", None)
         run = forward(
@@ -89,7 +92,7 @@ def command(
             reference=None if reference is None else read_run(reference),
             catalogue=load_catalogue(effects),
             load_mass=None if load_mass is None else quantity(load_mass, "mass"),
-            initial_speed=None if initial_speed is None else parse(initial_speed, dimension),
+            initial_speed=speed,
             rate=quantity(rate, "frequency"),
         )
     write_run(run, output, replace=replace)

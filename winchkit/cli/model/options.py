@@ -47,7 +47,7 @@ def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
 _MODEL_OPTIONS = all_of(
     profile_option,
     own_effects_option(),
-    click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
+    click.option("--winch", help="Which winch or axis of the runs; 'all' for each by itself."),
     click.option(
         "--predicted",
         metavar="OUTPUT=COLUMN",
@@ -96,7 +96,13 @@ class Asked:
             if self.predicted is not None:
                 raise UsageError("--predicted: is of one winch or axis, not of a robot")
             return read_all(paths)
-        runs = read_runs(paths, self.winch)
+        return self._predicted(read_runs(paths, self.winch))
+
+    def runs_of_each(self, paths: Sequence[str]) -> dict[str, list[Run]]:
+        """Runs of every winch or axis that is in all of them. Raises FileError, UsageError."""
+        return {name: self._predicted(runs) for name, runs in read_each(paths).items()}
+
+    def _predicted(self, runs: list[Run]) -> list[Run]:
         if self.predicted is None:
             return runs
         from winchkit.runs.predicted import with_prediction
@@ -112,9 +118,7 @@ class Asked:
 
     @property
     def each(self) -> bool:
-        """Whether every winch of the runs is asked for by itself. Raises UsageError."""
-        if self.winch == ALL and self.predicted is not None:
-            raise UsageError("--predicted: is of one winch; name it by --winch")
+        """Whether every winch or axis of the runs is asked for by itself."""
         return self.winch == ALL
 
     @property
@@ -175,7 +179,7 @@ def read_each(paths: Sequence[str]) -> dict[str, list[Run]]:
     names = [name for name in runs[0].winches() if all(name in run.winches() for run in runs)]
     if not names:
         listed = "; ".join(f"{run.path}: {', '.join(run.winches())}" for run in runs)
-        raise UsageError(f"no winch is in all of the runs: {listed}")
+        raise UsageError(f"no winch or axis is in all of the runs: {listed}")
     return {name: [run.of_winch(name) for run in runs] for name in names}
 
 
@@ -191,13 +195,13 @@ def _of_winch(run: Run, winch: str | None) -> Run:
     if winch is None:
         if len(known) > 1:
             raise UsageError(
-                f"{run.path}: has the winches {', '.join(known)}; choose one with --winch, "
+                f"{run.path}: has columns of {', '.join(known)}; choose one with --winch, "
                 "or use compare or diagnose with --winch all for each by itself"
             )
         return run.of_winch(known[0])
     named = known if known != [""] else list(filter(None, [run.metadata.get("winch")]))
     if named and winch not in named:
-        raise UsageError(f"{run.path}: has no winch '{winch}'; it has {', '.join(named)}")
+        raise UsageError(f"{run.path}: has no winch or axis '{winch}'; it has {', '.join(named)}")
     return run.of_winch(winch if known != [""] else "")
 
 
@@ -281,7 +285,7 @@ def pages_beside(path: str, winches: Sequence[str]) -> dict[str, str]:
     page = Path(path)
     names = {w: f"{page.stem}-{_NO_FILE.sub('-', w) or 'winch'}{page.suffix}" for w in winches}
     if len(set(names.values())) < len(names):
-        raise UsageError(f"--html: no page for each of the winches {', '.join(winches)}")
+        raise UsageError(f"--html: no page for each of {', '.join(winches)}")
     return names
 
 

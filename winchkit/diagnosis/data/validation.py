@@ -154,7 +154,9 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
         if named == profile.name:
             return []
         message = f"recorded with profile '{named}', compared with '{profile.name}'"
-        return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
+        return [
+            Fault(message + "; give the profile of this machine", where, key="metadata profile")
+        ]
     good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
     few = np.flatnonzero(good)[:: max(1, len(run) // MOST_SAMPLES)]
     line = Line(profile)

@@ -80,9 +80,16 @@ class EquivalenceSet:
     further: tuple[str, ...]
     """Effects beyond four, which fit worst."""
 
-    def beginning_with(self, effect: str) -> EquivalenceSet:
-        """The same set with another member first, beside which the others are compared."""
-        order = sorted(range(len(self.effects)), key=lambda i: self.effects[i] != effect)
+    def beginning_with(self, term: Term, fit: Fit) -> EquivalenceSet:
+        """The same set with a term of a final model first, beside which the others are compared. It
+        may be none of them: a law that explained no more than a simpler one, but predicts better.
+        """
+        if term.effect.id not in self.effects:
+            names = (term.effect.id, *self.effects)
+            return replace(
+                self, term=term, effects=names, terms=(term, *self.terms), fits=(fit, *self.fits)
+            )
+        order = sorted(range(len(self.effects)), key=lambda i: self.effects[i] != term.effect.id)
         terms = tuple(self.terms[i] for i in order)
         fits = tuple(self.fits[i] for i in order)
         names = tuple(self.effects[i] for i in order)
@@ -320,12 +327,12 @@ def with_first_members(
     for index, each in enumerate(sets, start=first):
         if each.effects[0] != hypothesis.terms[index].effect.id:
             hypothesis = hypothesis.exchanged(index, each.terms[0], engine.regression.n_runs)
-    own = [term.effect.id for term in final.hypothesis.terms[first:]]
     if hypothesis is not final.hypothesis:
         together = engine.refit(hypothesis, noise)
         if largest_rise(engine, together, final, noise) <= 1 / RELEVANT_RATIO:
-            final, own = together, [each.effects[0] for each in sets]
-    return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]
+            final = together
+    own = final.hypothesis.terms[first:]
+    return final, [each.beginning_with(term, final) for each, term in zip(sets, own, strict=True)]
 
 
 def pairs_of(sets: Sequence[EquivalenceSet]) -> list[tuple[Term, Term]]:

@@ -16,7 +16,6 @@ from winchkit.cli.model.options import (
     Asked,
     page_title,
     pages_beside,
-    read_each,
     save_figures,
     save_page,
     suggest_with,
@@ -37,6 +36,8 @@ def tell_diagnoses(
     figures: str | None,
 ) -> None:
     """Diagnosis of every winch of the runs by itself, and their common effects."""
+    from winchkit.diagnosis.linear_axis import in_units_of
+    from winchkit.effects.linear_axis import catalogue_of
     from winchkit.fleet.diagnosis.diagnose import diagnose_each
     from winchkit.fleet.diagnosis.meta_analysis import alarms, shared_effects
     from winchkit.fleet.report.comparison import shared_effects_text
@@ -46,7 +47,7 @@ def tell_diagnoses(
     present: dict[str, float] = {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
     with threads_abandoned(), progress_bar() as progress:
-        winches = read_each(runs)
+        winches = asked.runs_of_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         each = diagnose_each(winches, declared, catalogue, asked.band, **how, progress=progress)
         for name, answer in each:
@@ -60,16 +61,19 @@ def tell_diagnoses(
             if figures:
                 save_figures(figures, answer_figures(answer, asked), name)
             del answer  # hundreds of megabytes after long runs
-    shared, chances = shared_effects(found, catalogue), alarms(found, present)
+    shared = shared_effects(found, catalogue_of(declared, catalogue))
+    chances = alarms(found, present)
     if is_json():
         together = {"effects": [one.to_json() for one in shared], "alarms": chances}
         echo_json({"schema": 1, "winches": told, "shared": together})
     else:
-        echo_each(told, shared_effects_text(found, shared, chances))
+        overview = in_units_of(declared, shared_effects_text(found, shared, chances))
+        echo_each(told, overview, in_units_of(declared, "winch"))
     if html:
         from winchkit.fleet.report.comparison import shared_effects_html
 
-        write_page(html, shared_effects_html(found, shared, chances, title, pages))
+        page = shared_effects_html(found, shared, chances, title, pages)
+        write_page(html, in_units_of(declared, page))
     if figures:
         note(f"figures: {figures}")
 
@@ -83,6 +87,7 @@ def tell_comparisons(
 ) -> None:
     """Every winch of the runs by itself, and what their errors follow alike or not."""
     from winchkit.diagnosis.compare import compared
+    from winchkit.diagnosis.linear_axis import in_units_of
     from winchkit.fleet.diagnosis.anova import errors_of, shared_errors
     from winchkit.fleet.report.comparison import shared_errors_text
     from winchkit.report.pages.pages import comparison_figures, comparison_html
@@ -92,10 +97,10 @@ def tell_comparisons(
     found, errors = {}, {}
     title, catalogue = page_title(declared.name, runs), asked.catalogue
     with progress_bar() as progress:
-        winches = read_each(runs)
+        winches = asked.runs_of_each(runs)
         pages = pages_beside(html, list(winches)) if html else {}
         for index, (name, own) in enumerate(winches.items()):
-            progress(f"winch {name}", index / len(winches))
+            progress(name, index / len(winches))
             answer = compared(own, declared, catalogue, asked.band)
             found[name], errors[name] = answer.comparison, errors_of(answer)
             if html:
@@ -113,11 +118,13 @@ def tell_comparisons(
         echo_json({"schema": 1, "winches": said, "shared": {"outputs": outputs}})
     else:
         texts = {name: compare_text(one, verbose=is_verbose()) for name, one in found.items()}
-        echo_each(texts, shared_errors_text(found, shared))
+        overview = in_units_of(declared, shared_errors_text(found, shared))
+        echo_each(texts, overview, in_units_of(declared, "winch"))
     if html:
         from winchkit.fleet.report.comparison import shared_errors_html
 
-        write_page(html, shared_errors_html(found, shared, title, pages))
+        page = shared_errors_html(found, shared, title, pages)
+        write_page(html, in_units_of(declared, page))
     if figures:
         note(f"figures: {figures}")
     suggest_with("diagnose", asked, runs)

@@ -65,7 +65,7 @@ def diagnose_each(
     def one(name: str) -> WinchAnswer:
         def report_progress(what: str, share: float) -> None:
             shares[name] = share
-            progress(f"winch {name}: {what}" if name else what, sum(shares.values()) / len(shares))
+            progress(f"{name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
         answer = diagnose(
             winches[name],

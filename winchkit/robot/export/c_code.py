@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.dynamics.c_code import c_body, c_header, c_literal, identifier
+from winchkit.dynamics.c_code import c_body, c_header, c_literal, identifier, in_comment
 from winchkit.dynamics.expression import Expression, symbol
 from winchkit.dynamics.tracing import expression, traced
 from winchkit.robot.export.lines import RobotLine
@@ -182,13 +182,13 @@ def robot_header(robot: Robot, lines: Sequence[RobotLine]) -> tuple[str, list[st
     fields = {
         "p": p,
         "P": p.upper(),
-        "name": robot.profile.name,
-        "names": ", ".join(robot.names),
+        "name": in_comment(robot.profile.name),
+        "names": in_comment(", ".join(robot.names)),
         "count": len(lines),
         "free": len(rows),
         "rows": ", ".join(map(str, rows)),
         "geometry": "".join(
-            f"    {{{', '.join(map(repr, row))}}}, /* line {name} */\n"
+            f"    {{{', '.join(map(repr, row))}}}, /* line {in_comment(name)} */\n"
             for row, name in zip(line_numbers(place), robot.names, strict=True)
         ),
         "cable": _cable(p, place.free),

@@ -68,7 +68,7 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
             + (
                 "these samples are not compared"
                 if kind == "motor_torque"
-                else "larger errors there are no effect of the winch"
+                else "larger errors there are no effect of the machine"
             )
         )
         yield Finding(SATURATED, run.name, name, float(at.mean()), text)
