@@ -26,7 +26,7 @@ from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.steps import alike, doubt_texts, reported_steps, step_text
+from winchkit.report.words.steps import alike, doubt_texts, overlap, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     clause,
     combination_text,
@@ -80,7 +80,8 @@ def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> 
             element("li", capital(text), class_="doubt")
             for text in doubt_texts(step, diagnosis.data)
         ]
-        text = unbroken(capital(step_text(step, diagnosis.outputs, errors[index])))
+        words = step_text(step, diagnosis.outputs, errors[index], overlaps=overlap(diagnosis))
+        text = unbroken(capital(words))
         items.append(element("li", text, *([element("ul", *doubts)] if doubts else [])))
     return element("ol", *items, class_="found") if items else Markup("")
 

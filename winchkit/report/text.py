@@ -50,7 +50,14 @@ from winchkit.report.words.sentence import (
     where_text,
     wrong_channels,
 )
-from winchkit.report.words.steps import alike, doubt_texts, named_only, reported_steps, step_text
+from winchkit.report.words.steps import (
+    alike,
+    doubt_texts,
+    named_only,
+    overlap,
+    reported_steps,
+    step_text,
+)
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -149,9 +156,11 @@ def step_lines(
     errors = [*without, *[{}] * len(diagnosis.steps)]
     told = reported_steps(diagnosis)
     small = named_only([diagnosis.steps[index] for index in told])
+    overlaps = overlap(diagnosis)
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
-        own = paragraph(step_text(step, diagnosis.outputs, errors[index]), f"{number}. ", "   ")
+        text = step_text(step, diagnosis.outputs, errors[index], overlaps=overlaps)
+        own = paragraph(text, f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
         if most is not None and lines and (step in small or len(lines) + len(own) > most):

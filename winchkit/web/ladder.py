@@ -26,6 +26,7 @@ from winchkit.report.words.steps import (
     alike,
     doubt_texts,
     has_other_law,
+    overlap,
     reported,
     reported_steps,
     step_text,
@@ -60,7 +61,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
             {
                 "effect": step.effects[0],
                 "certain": step.certain,
-                "text": capital(step_text(step)),
+                "text": capital(step_text(step, overlaps=overlap(diagnosis))),
                 "doubts": [capital(text) for text in doubt_texts(step, diagnosis.data)],
             }
             for step in reported(diagnosis).steps

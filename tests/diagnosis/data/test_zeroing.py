@@ -102,6 +102,22 @@ def test_an_offset_per_run_does_not_hide_an_effect(name: str, size: float) -> No
     assert values["drum-radius"]["radius_error"].value == pytest.approx(0.3e-3, abs=0.02e-3)
 
 
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_the_tension_of_another_load_is_no_zero(repeats: int) -> None:
+    """A wrong zero of hundreds of newtons would leave no error, whatever was measured."""
+    runs = [
+        made(10 * i + k, GROOVED, load_mass=mass, ride=Ride(samples=800))
+        for i, mass in enumerate((10.0, 25.0, 40.0))
+        for k in range(repeats)
+    ]
+    turned = runs[1:] + runs[:1]
+    mixed = [with_channel(a, "tension", b["tension"]) for a, b in zip(runs, turned, strict=True)]
+    found = diagnose(mixed, GROOVED).diagnosis
+    assert found.verdict in {"unknown", "undecided"}
+    assert not any(f.code == "zeroed-anew" and f.channel == "tension" for f in found.sanity)
+    assert not any(step.certain for step in found.steps)
+
+
 def test_every_run_has_a_column_of_its_own() -> None:
     runs = [made(k, load_mass=10.0) for k in range(3)]
     runs = [shifted(run, "cable_length", 0.01 * k) for k, run in enumerate(runs)]

@@ -123,12 +123,20 @@ def test_a_law_that_leaves_its_own_variable_is_open(tmp_path: Path, quadratic: f
     assert bool(doubts(found) & {"curve"}) == bool(quadratic)
 
 
-@pytest.mark.parametrize(("curve", "certain"), [("speed", False), ("drum angle", True), ("", True)])
-def test_a_law_beside_an_unknown_one_over_its_variable_is_not_certain(
-    curve: str, certain: bool
+@pytest.mark.parametrize(
+    ("curve", "along", "certain"), [("speed", 1.0, False), ("speed", 0.0, True), ("", 1.0, True)]
+)
+def test_a_law_beside_an_unknown_one_that_changes_the_same_is_not_certain(
+    curve: str, along: float, certain: bool
 ) -> None:
+    torque = ("motor_torque",)
     viscous = Step(("motor-viscous",), {}, 0.5, certain=True)
     other = Step(("friction-growth",), {}, 0.1, law="open", curve=curve)
-    judged = beside_unknown(viscous, [viscous, other], frozenset({"speed"}))
+    changes = [np.array([3.0, 0.0]), np.array([along, 1.0])]
+    judged, left = beside_unknown([viscous, other], [torque, torque], changes)
     assert judged.certain == certain
     assert bool(judged.doubts) != certain
+    assert left == other
+    # What acts on another output as well is known from there.
+    both = [torque, ("motor_torque", "tension")]
+    assert beside_unknown([viscous, other], both, changes)[0] == viscous

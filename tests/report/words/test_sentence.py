@@ -46,6 +46,22 @@ def test_one_effect_has_the_change_of_the_error_that_falls_most() -> None:
     assert "cable length" not in text, "another one falls more"
 
 
+@pytest.mark.parametrize(
+    ("laws", "opening"),
+    [
+        (("cable-elongation-linear", "cable-elongation-quartic"), "With it, "),
+        (("cable-elongation-linear", "frame-compliance"), "With either, "),
+        (("cable-elongation-linear", "frame-compliance", "cable-creep"), "With any of them, "),
+        (("drum-radius", "gear-ratio"), "With either corrected, "),
+    ],
+)
+def test_the_error_falls_with_one_of_as_many_as_are_named(
+    laws: tuple[str, ...], opening: str
+) -> None:
+    step = replace(ELASTIC, effects=laws, doubts=())
+    assert f" {opening}the cable length error falls" in sentence(diagnosis_of("explained", step))
+
+
 def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
     curved = kind("cable-elongation-quartic")
     assert curved == kind("cable-elongation-exponential") == kind("cable-elongation-linear")

@@ -32,6 +32,15 @@ def test_a_step_has_value_error_without_and_with_it_and_share() -> None:
     )
 
 
+def test_shares_of_laws_that_overlap_are_said_to_be_beside_the_others() -> None:
+    """Friction and viscosity at one speed explain all together, and little each."""
+    first, second = replace(ELASTIC, share=0.06), replace(FRICTION, share=0.03)
+    small = " ".join(" ".join(step_lines(diagnosis_of("explained", first, second))).split())
+    assert "explains 6.0 % that the others do not" in small
+    apart = step_lines(diagnosis_of("explained", replace(first, share=0.7), second))
+    assert not any("the others" in line for line in apart)
+
+
 def test_a_step_that_lowers_no_error_shows_none() -> None:
     same = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
     assert lowered_most(OUTPUTS, same) == ""

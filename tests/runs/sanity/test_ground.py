@@ -59,7 +59,7 @@ def lifting(
     return Run("lift", time, channels, metadata={"load_mass": f"{MASS} kg"})
 
 
-@given(SEEDS, st.floats(0.02, 0.4), st.floats(0.0, 0.6), st.booleans())
+@given(SEEDS, st.floats(0.02, 0.8), st.floats(0.0, 0.6), st.booleans())
 @settings(max_examples=60, deadline=None)
 def test_the_stretch_on_the_ground_is_found_and_no_more_than_is_put_down(
     seed: int, ground: float, friction: float, cell: bool
@@ -79,6 +79,15 @@ def test_a_hanging_load_has_no_such_stretch(
     seed: int, friction: float, inertia: float, cell: bool
 ) -> None:
     assert not ground_mask(lifting(seed, friction=friction, inertia=inertia, cell=cell)).any()
+
+
+@given(SEEDS, st.floats(0.6, 0.95), st.floats(2.2, 3.5))
+def test_a_load_that_jams_at_the_top_hangs_below(seed: int, begins: float, times: float) -> None:
+    run = lifting(seed, friction=0.1, cell=True)
+    angle = np.abs(run["motor_angle"] - run["motor_angle"][0])
+    jams = angle > begins * angle.max()
+    tension = Channel(np.where(jams, times, 1.0) * run["tension"], "N")
+    assert not ground_mask(replace(run, channels={**run.channels, "tension": tension})).any()
 
 
 def test_an_eccentric_weight_stands_on_no_ground() -> None:

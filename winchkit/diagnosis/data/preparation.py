@@ -30,7 +30,7 @@ from winchkit.diagnosis.data.spectrum import fast_count
 from winchkit.diagnosis.data.standstill import standstill_findings
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.validation import validate_runs, with_torques, without_constants
-from winchkit.diagnosis.data.zeroing import angles_from_zero, as_noise, is_setting, zeroed_anew
+from winchkit.diagnosis.data.zeroing import angles_from_zero, as_noise, no_zero, zeroed_anew
 from winchkit.diagnosis.linear_axis import errors_in_units_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import Fault, RunError, UsageError
@@ -124,13 +124,13 @@ def _prepared(
     if nowhere := [r for r in recordings if not any(map(np.any, r.valid.values()))]:
         what = "has no sample that can be compared: `winchkit check` shows what is left out"
         raise RunError([Fault(what, r.path or r.name) for r in nowhere])
-    anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
-    at_speeds = is_setting([motion.motor_rate for motion in dataset.motions])
-    zeroed = [
-        as_noise(finding) if at_speeds and finding.channel != "cable_length" else finding
-        for finding in anew
-        if finding is not None
-    ]
+    zeroed = []
+    for output in OUTPUTS:
+        found = zeroed_anew(output, *_repeat_differences(dataset, output))
+        if found is not None:
+            values = [r.measured[output] for r in dataset.recordings if output in r.measured]
+            reason = no_zero(found, [motion.motor_rate for motion in dataset.motions], values)
+            zeroed.append(as_noise(found, reason) if reason else found)
     if "cable_length" not in {finding.channel for finding in zeroed}:
         zeroed += angles_from_zero(runs)
     factor = 1 if decimation is None else decimation.factor

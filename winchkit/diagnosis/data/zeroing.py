@@ -38,6 +38,8 @@ _LEAST_SAMPLES = 64
 _LEVEL_OF_WANDER = 0.01
 """Level of the test that the level of block means exceeds a random walk from zero; convention;
 simulated size at most 1.3 %, of white noise to a walk, 1 to 6 runs."""
+_AS_LARGE = 0.25
+"""Offset over the largest values of a force from which it is no wrong zero; rule of thumb."""
 _REGION = 3.841
 """Increase of the restricted deviance up to which a ratio of variances is not rejected; theory: 95
 % quantile of χ²(1)."""
@@ -116,15 +118,29 @@ def is_setting(values: Sequence[Array]) -> bool:
     return float(np.var([np.mean(own) for own in values])) > within
 
 
-def as_noise(finding: Finding) -> Finding:
-    """The finding on an offset of a force or torque where the speed is a setting of the runs."""
+def as_noise(finding: Finding, reason: str) -> Finding:
+    """The finding on an offset of a force or torque that is no zero."""
     spread = quantity(finding.value, OUTPUT_UNITS[finding.channel])
     text = (
-        f"the offset differs between repeats by {spread} (standard deviation): the runs differ in "
-        "speed or direction, on which friction depends, so that no offset per run is fitted; it "
-        "counts as noise"
+        f"the offset differs between repeats by {spread} (standard deviation): {reason}, so that "
+        "no offset per run is fitted; it counts as noise"
     )
     return Finding("offset-as-noise", "", finding.channel, finding.value, text)
+
+
+def no_zero(finding: Finding, rates: Sequence[Array], measured: Sequence[Array]) -> str:
+    """Reason why an offset between repeats of a force or torque is none of its zero, else empty.
+
+    ``rates`` are the speeds of the runs and ``measured`` the values of the output, (n,) each.
+    """
+    if finding.channel == "cable_length":
+        return ""
+    if is_setting(rates):
+        return "the runs differ in speed or direction, on which friction depends"
+    usual = float(np.quantile(np.abs(np.concatenate(measured)), 0.95))
+    if finding.value > _AS_LARGE * usual:
+        return "that is a quarter of the largest values and more, as of another load"
+    return ""
 
 
 def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:

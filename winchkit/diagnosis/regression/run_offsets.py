@@ -28,7 +28,7 @@ from winchkit.diagnosis.data.zeroing import (
     BLOCKS,
     LEVEL,
     is_random_walk,
-    is_setting,
+    no_zero,
     zeroed_finding,
 )
 from winchkit.diagnosis.regression.gls import Fit
@@ -62,12 +62,10 @@ def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str)
 
     None with fewer than two runs, or where the offsets are within the variation over eight blocks
     of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random walk from
-    a common zero makes them. None also of a force or torque where the speed is a setting of the
-    runs: friction that depends on it would be taken for offsets.
+    a common zero makes them, nor for offsets that are none of a zero
+    (:func:`~winchkit.diagnosis.data.zeroing.no_zero`).
     """
     dataset = regression.dataset
-    if output != "cable_length" and is_setting([motion.motor_rate for motion in dataset.motions]):
-        return None
     own = [s for s in regression.segments if s.output == output]
     own = [s for s in own if not (output == "cable_length" and dataset.recordings[s.run].zeroed)]
     if len(own) < 2 or output in dataset.zeroed_anew:
@@ -108,7 +106,10 @@ def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str)
     )
     if p_value >= LEVEL or is_random_walk(means + (shifts - shifts.mean())[:, None]):
         return None
-    return zeroed_finding(output, float(np.std(shifts, ddof=1)), p_value, "runs")
+    found = zeroed_finding(output, float(np.std(shifts, ddof=1)), p_value, "runs")
+    measured = [dataset.recordings[s.run].measured[output] for s in own]
+    rates = [motion.motor_rate for motion in dataset.motions]
+    return None if no_zero(found, rates, measured) else found
 
 
 def run_offsets(

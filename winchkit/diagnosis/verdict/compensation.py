@@ -2,16 +2,20 @@
 
 The steps over one variable are replaced by one curve over it, and those of a torque by one factor
 on what the profile predicts, beside the values of the profile's file. Where that explains as much
-with fewer parameters, none of the steps is certain; nor is one beside an open law over its
-variable. Where one curve explains nine tenths of the excess and the effects of a search together
+with fewer parameters, none of the steps is certain; nor is one beside an open law that changes the
+same alike. Where one curve explains nine tenths of the excess and the effects of a search together
 clearly less, they imitate an unknown law: the search ends with the closest one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.conditioning import change_by
 from winchkit.diagnosis.regression.cross_validation import CERTAIN
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, held
@@ -97,11 +101,9 @@ def with_compensations(
             what = f"a torque constant that is wrong by {100 * (factor - 1):+.1f} %"
             for place in torque:
                 out[place] = _doubted(out[place], "factor", what, len(torque))
-    outputs = {place: {*terms[index].effect.outputs} for place, index in at.items()}
-    return tuple(
-        beside_unknown(step, [o for i, o in enumerate(out) if outputs[i] <= outputs[place]], own)
-        for (place, step), own in zip(enumerate(out), over.values(), strict=True)
-    )
+    weights = result.noise.inverse_sigma(engine.regression)
+    changes = [weights * change_by(engine.regression, result.final, at[place]) for place in at]
+    return beside_unknown(out, [terms[at[place]].effect.outputs for place in at], changes)
 
 
 def _doubted(step: Step, code: str, what: str, count: int) -> Step:
@@ -115,14 +117,33 @@ def _doubted(step: Step, code: str, what: str, count: int) -> Step:
     return replace(step, law=law, certain=False, doubts=(*step.doubts, Doubt(code, text)))
 
 
-def beside_unknown(step: Step, others: Sequence[Step], variables: frozenset[str]) -> Step:
-    """A step that is not certain beside another one whose open law is over one of its variables."""
-    known = {variable.replace("_", " ") for variable in variables}
-    words = next((other.curve for other in others if other.curve in known), "")
-    if step.curve or not words:
-        return step
-    text = f"the law of another effect over {words} is unknown: its value may contain a part of it"
-    return replace(step, certain=False, doubts=(*step.doubts, Doubt("curve", text)))
+def beside_unknown(
+    steps: Sequence[Step], outputs: Sequence[Collection[str]], changes: Sequence[Array]
+) -> tuple[Step, ...]:
+    """Steps that are not certain beside another one with an open law that acts on nothing else,
+    where a tenth of the square of one's change (n,) is along the other's.
+    """
+    out = []
+    for own, step in enumerate(steps):
+        laws = (
+            other.curve
+            for place, other in enumerate(steps)
+            if place != own
+            and {*outputs[place]} <= {*outputs[own]}
+            and float(changes[own] @ changes[place]) ** 2
+            > CERTAIN * float(np.sum(changes[own] ** 2) * np.sum(changes[place] ** 2))
+        )
+        words = next(filter(None, laws), "")
+        if words and not step.curve:
+            text = (
+                f"the law of another effect over {words} is unknown: its value may contain a part "
+                "of it"
+            )
+            doubts = (*step.doubts, Doubt("curve", text))
+            out.append(replace(step, certain=False, doubts=doubts))
+        else:
+            out.append(step)
+    return tuple(out)
 
 
 @dataclass(frozen=True)

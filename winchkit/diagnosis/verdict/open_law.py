@@ -132,11 +132,13 @@ def _better(
     reaches = lacking and not _is_above(errors[2 + best], size)
     if explained <= 0.0 or (gained <= MARGIN * explained and not reaches):
         return None
-    return OpenLaw(
-        found[best],
-        f"a free curve over {found[best].words} explains {percent(gained / explained)} more: the "
-        "law is another one",
+    more = (
+        f"explains {percent(gained / explained)} more"
+        if gained > MARGIN * explained
+        else "reaches the noise, which this law does not"
     )
+    curve = found[best]
+    return OpenLaw(curve, f"a free curve over {curve.words} {more}: the law is another one")
 
 
 def _is_above(

@@ -14,7 +14,7 @@ from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause, reported
+from winchkit.report.words.steps import cause, kinds_of, reported
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -98,12 +98,13 @@ def error_text(diagnosis: Diagnosis) -> str:
         subject = "It" if is_named else f"The {output_name(name)} error"
         return f"{subject} is {size_texts(outputs)[name]}."
     first, *others = steps
-    either = len(first.effects) > 1 and not first.whole
-    opening = "With them" if others else "With either" if either else "With it"
+    count = 1 if first.whole else len(kinds_of(first))
+    found = "it" if count == 1 else "either" if count == 2 else "any of them"
+    opening = "With them" if others else f"With {found}"
     if diagnosis.verdict == "unknown":
         opening = f"With the effect{'s' if others else ''} found"
     if not others and all(is_wrong_value(effect) for effect in first.effects):
-        opening = "With either corrected" if either else "Corrected"
+        opening = "Corrected" if count == 1 else f"With {found} corrected"
     if all(step.refitted for step in steps):
         opening = "Corrected"
     return gain_text(outputs, opening, most=1) or _NO_GAIN

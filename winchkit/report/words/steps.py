@@ -37,6 +37,8 @@ _MAIN = 0.9
 ``explained``."""
 _NORMAL_95 = 1.96
 """Standard deviations on each side of a 95 % interval, where none was computed."""
+_OVERLAP = 0.5
+"""Sum of the shares, over what all steps explain, below which they are said to overlap."""
 _D = TypeVar("_D", bound=Diagnosis)
 
 
@@ -80,6 +82,15 @@ def named_only(steps: Sequence[Step]) -> list[Step]:
     return small if main > _MAIN else []
 
 
+def overlap(diagnosis: Diagnosis) -> bool:
+    """Whether most of what the steps explain is explained by several of them: a friction and a
+    viscosity at one speed have small shares, and nothing remains.
+    """
+    explained = 1.0 - diagnosis.unexplained_share
+    shares = [step.share for step in diagnosis.steps]
+    return len(shares) > 1 and sum(shares) < _OVERLAP * explained
+
+
 def _agrees(estimate: Estimate, file_value: float) -> bool:
     """Whether the 95 % interval of a value holds that of the file."""
     half = _NORMAL_95 * estimate.std
@@ -112,7 +123,7 @@ def step_title(step: Step) -> str:
         return f"{_refitted_values(step, with_errors=False)} in the profile"
     if has_other_law(step):
         return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
-    kinds = _kinds(step)
+    kinds = kinds_of(step)
     if len(kinds) > _MOST_KINDS:
         return f"one of {len(kinds)} effects is missing, which these data cannot distinguish"
     return listed([clause(effect) for effect in kinds], "or")
@@ -129,10 +140,13 @@ def step_text(
     step: Step,
     outputs: Mapping[str, OutputFit] | None = None,
     without: Mapping[str, float] | None = None,
+    *,
+    overlaps: bool = False,
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
+    ``overlaps``: the steps explain more together than each beside the others.
     """
     parts = [_titled_values(step)]
     if outputs and without and (name := lowered_most(outputs, without)):
@@ -143,7 +157,7 @@ def step_text(
         parts.append(f"{output_name(name)} {before} → {then}")
     if isfinite(step.share):
         share = percent(step.share) if step.share >= _LEAST else "under 0.1 %"
-        parts.append(f"explains {share}")
+        parts.append(f"explains {share}{' that the others do not' if overlaps else ''}")
     return "; ".join(parts)
 
 
@@ -190,13 +204,13 @@ def _titled_values(step: Step) -> str:
     if step.refitted:
         changed = _refitted_values(step, with_errors=True)
         return f"{clause(step.effects[0])}: {changed} in the profile"
-    values = {e: values_text(step.parameters.get(e, {})) for e in _kinds(step)}
+    values = {e: values_text(step.parameters.get(e, {})) for e in kinds_of(step)}
     if has_other_law(step) or len(values) == 1:
         return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)
     return listed([f"{clause(e)} ({v})" if v else clause(e) for e, v in values.items()], "or")
 
 
-def _kinds(step: Step) -> list[str]:
+def kinds_of(step: Step) -> list[str]:
     """First effect of every kind of a set: there are several laws of elongation."""
     first: dict[str, str] = {}
     for effect in step.effects:

@@ -3,7 +3,7 @@
 The samples of a run are sorted by the motor angle into groups of equal count. The force of a group
 is the mean of its medians winding in and paying out, so that friction cancels. A hanging mass gives
 nearly the same force everywhere; where it stands on the ground, where the cable is slack or a brake
-holds it, the force at one end is below half of that, by more than its scatter. No drum, friction or
+holds it, the force at one end is nearly zero, by more than its scatter. No drum, friction or
 inertia does this: at the lower end a motion turns by an acceleration upwards, which raises it. A
 force of the other sign there is that of an eccentric weight.
 """
@@ -30,8 +30,11 @@ _LEAST_GROUPS = 12
 """Groups below which a run has no end and no middle."""
 _LOW = 0.5
 """Share of the usual force below which it is low: halfway between all of the weight and none."""
-_MOST = 0.6
-"""Share of the samples up to which a stretch is an end: the rest has the usual force."""
+_MOST = 0.9
+"""Share of the samples up to which a stretch is an end: the rest has the usual force. A run may
+stand on the ground for most of its time."""
+_NONE = 0.25
+"""Share of the usual force that may be left there: a load that jams at the top has more."""
 _SCATTER = 5.0
 """Scatter of neighbouring groups that the step exceeds, as in `diagnosis/data/sign_and_scale.py`.
 """
@@ -90,7 +93,7 @@ def _edge(position: Array, force: Array) -> float | None:
     step = float(np.median(usual[first:]) - np.median(usual[: max(first, 1)]))
     if first == 0 or first > _MOST * count or low[first:].any() or step < _SCATTER * scatter:
         return None
-    if np.min(usual[:first]) < -_LOW * level:
+    if np.min(usual[:first]) < -_LOW * level or np.median(usual[:first]) > _NONE * level:
         return None
     while first < count - _AHEAD and usual[first] < _FULL * np.median(
         usual[first + 1 : first + 1 + _AHEAD]
