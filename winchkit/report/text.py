@@ -155,7 +155,7 @@ def step_lines(
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
     told = reported_steps(diagnosis)
-    small = named_only([diagnosis.steps[index] for index in told])
+    small = named_only([diagnosis.steps[index] for index in told], diagnosis.outputs)
     overlaps = overlap(diagnosis)
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
