@@ -86,7 +86,7 @@ _USED = 0.95
 """Share of the samples of an output from which practically all are compared."""
 FAILS = "where it fails (shares of the error's variance)"
 _STEP_LINES = 12
-"""Lines of steps in the short text."""
+"""Lines of steps in the short text, or as many as the rest leaves."""
 
 
 def report_text(answer: Answer, *, verbose: bool = False) -> str:
@@ -96,7 +96,6 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     notes = [note for note in diagnosis.notes if verbose or note not in limits]
     blocks = [
         head_lines(diagnosis),
-        step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
         diagnosed_errors(diagnosis),
         _remaining(answer, verbose=verbose),
         _changes(diagnosis),
@@ -113,6 +112,9 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         ]
     if verbose or diagnosis.interrupted:
         blocks.append(_candidates(answer))
+    room = _MOST_LINES - 1 - len(joined(blocks).split("\n"))
+    most = None if verbose else max(_STEP_LINES, room)
+    blocks.insert(1, step_lines(diagnosis, errors_without(answer), most))
     lines = joined(blocks).split("\n")
     if len(lines) > _MOST_LINES and not verbose:
         lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
