@@ -112,9 +112,14 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         ]
     if verbose or diagnosis.interrupted:
         blocks.append(_candidates(answer))
-    room = _MOST_LINES - 1 - len(joined(blocks).split("\n"))
-    most = None if verbose else max(_STEP_LINES, room)
-    blocks.insert(1, step_lines(diagnosis, errors_without(answer), most))
+
+    def steps(most: int | None) -> list[str]:
+        return step_lines(diagnosis, without, most)
+
+    without, room = errors_without(answer), _MOST_LINES - 1 - len(joined(blocks).split("\n"))
+    shorter = (steps(most) for most in range(room, _STEP_LINES, -1))
+    fitting = next((lines for lines in shorter if len(lines) <= room), None)
+    blocks.insert(1, steps(None) if verbose else fitting or steps(_STEP_LINES))
     lines = joined(blocks).split("\n")
     if len(lines) > _MOST_LINES and not verbose:
         lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
