@@ -32,7 +32,7 @@ from winchkit.diagnosis.results import (
 )
 from winchkit.quantity_text import percent
 from winchkit.report.detectability import untestable, useful_candidates, visible
-from winchkit.report.figures.waterfall import errors_without
+from winchkit.report.figures.waterfall import falls_of
 from winchkit.report.text import FAILS, addition_text, compare_text, report_text
 from winchkit.report.words.sentence import changes_text, headline
 from winchkit.report.words.steps import lowered_most, step_text
@@ -91,21 +91,25 @@ def test_the_shape_of_a_residual_is_drawn_over_its_variable() -> None:
     assert int(np.argmax(np.abs(np.fft.rfft(heights - heights.mean())))) == 5
 
 
-def test_every_step_has_the_error_without_it_and_its_share() -> None:
+def test_every_step_has_the_error_before_and_after_it_and_its_share() -> None:
     answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
     text = " ".join(report_text(answer, verbose=True).split())
-    found = zip(answer.diagnosis.steps, errors_without(answer), strict=True)
+    found = zip(answer.diagnosis.steps, falls_of(answer), strict=True)
     outputs = {"cable-elongation-linear": "cable_length", "motor-coulomb": "motor_torque"}
-    for step, without in found:
+    for step, fall in found:
         name = outputs.pop(step.effects[0], "")
         if name:
-            # One effect moves the length, the other the torque: without it the error is the first.
-            before = answer.diagnosis.outputs[name].heldout_rms_before
-            assert lowered_most(answer.diagnosis.outputs, without) == name
-            assert without[name] == pytest.approx(before, rel=0.02)
-        told = step_text(step, answer.diagnosis.outputs, without)
+            # One effect moves the length, the other the torque, whichever is first.
+            output = answer.diagnosis.outputs[name]
+            assert lowered_most(fall) == name
+            assert fall[0][name] == pytest.approx(output.heldout_rms_before, rel=0.02)
+            assert fall[1][name] == pytest.approx(output.heldout_rms_after, rel=0.1), (
+                "a small third"
+            )
+            assert step.explains == pytest.approx(step.share, abs=0.02)
+        told = step_text(step, answer.diagnosis.outputs, fall)
         assert "→" in told
-        assert f"explains {percent(step.share)}" in told
+        assert f"explains {percent(step.explains)}" in told
         assert told in text
     assert not outputs
 

@@ -435,8 +435,11 @@ def _steps(
         )
         rounded = _rounded_law(engine, result, first + place, outputs, standing)
         standings.append(replace(standing, rounded=rounded))
-    for place, step in enumerate(steps_of(engine, result, sets, engine.regression.dataset, spread)):
-        beside = [one for one, there in zip(standings, acts, strict=True) if there & acts[place]]
+    steps = steps_of(
+        engine, result, sets, dataset=engine.regression.dataset, spread=spread, outputs=outputs
+    )
+    for place, step in enumerate(steps):
+        before = [steps[other] for other in range(place) if acts[other] & acts[place]]
         yield with_standing(
             engine,
             result,
@@ -444,7 +447,7 @@ def _steps(
             index=first + place,
             standing=standings[place],
             curve=open_law(engine, final, noise, first + place),
-            small=is_small(standings[place], beside),
+            small=is_small(step, before),
         )
 
 

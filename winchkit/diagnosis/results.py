@@ -121,6 +121,9 @@ class OutputFit:
     """Without repeats: the whole residual, an upper bound."""
     p_value: float | None = None
     """Probability of as large a misfit by the noise of the repeats alone."""
+    heldout_on: str = "runs"
+    """Data of the held-out errors: ``runs`` of another load or programme, ``parts of the runs``
+    where a value is determined by one of these only, or ``poses``."""
 
 
 @dataclass(frozen=True)
@@ -185,6 +188,9 @@ class Step:
     what it explains."""
     share: float = float("nan")
     """Share of the excess over the noise that only this step explains (leave-one-out)."""
+    explains: float = float("nan")
+    """Share that it explains beside the additions before it, in the order in which the model grows;
+    of laws that overlap the first explains most. NaN where it is not computed."""
     doubts: tuple[Doubt, ...] = ()
     curve: str = ""
     """Variable, in words, of a free curve that explains more than the law, where there is one."""
@@ -218,6 +224,7 @@ class Step:
             "law": self.law,
             "certain": self.certain,
             "share": self.share,
+            "explains": self.explains,
             "doubts": [vars(doubt) for doubt in self.doubts],
             "curve": self.curve or None,
             "refitted": self.refitted,

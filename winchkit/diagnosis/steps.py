@@ -19,6 +19,7 @@ from winchkit.diagnosis.credibility import (
     unresolved_order,
 )
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.conditioning import (
     COLLINEAR_DELAY,
     collinearity,
@@ -51,20 +52,25 @@ def steps_of(
     engine: SelectionEngine,
     result: SelectionResult,
     sets: Sequence[EquivalenceSet],
+    *,
     dataset: Dataset | None = None,
     spread: Spread | None = None,
+    outputs: Mapping[str, OutputFit] | None = None,
 ) -> tuple[Step, ...]:
     """Every addition with its equivalence set, values and held-out gain; the ``dataset`` of a winch
-    is for combinations that have a name.
+    is for combinations that have a name, the ``outputs`` for what each addition explains.
     """
     final, noise, regression = result.final, result.noise, engine.regression
     out = []
     spread = spread or spread_of(regression, final, noise, regression.blocks)
     own = estimates(regression, final, spread)[engine.n_initial_terms :]
     covariance = value_covariance(regression, final, noise)
-    for equivalence, gain, (term, values) in zip(
-        sets, _gains(engine, final, noise), own, strict=True
-    ):
+    growth = _growth(engine, final, noise)
+    folds = engine.folds(final, noise)
+    explained = _explained(engine, growth, noise, folds, outputs or {})
+    squares = [float(np.sum(held_out(regression, fitted, noise, folds))) for fitted in growth]
+    gains = [1 - after / before for before, after in pairwise(squares)]
+    for equivalence, gain, share, (term, values) in zip(sets, gains, explained, own, strict=True):
         parameters = {
             member.effect.id: values
             if member.effect.id == term.effect.id
@@ -83,6 +89,7 @@ def steps_of(
                 equivalence.angles,
                 combination=combination,
                 place=place,
+                explains=share,
                 doubts=_further(equivalence.further),
             )
         )
@@ -103,11 +110,11 @@ class Standing:
     """Simpler law with a rounded reversal that explains all but a tenth of it; empty without."""
 
 
-def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
-    """Whether another step of the same outputs explains more than ten times as much: its law is
+def is_small(step: Step, before: Iterable[Step]) -> bool:
+    """Whether a step before it in the same outputs explains more than ten times as much: its law is
     known to a tenth, and what it leaves may be this step.
     """
-    return any(standing.explained < CERTAIN * other.explained for other in others)
+    return any(step.explains < CERTAIN * other.explains for other in before)
 
 
 def standing_of(
@@ -260,17 +267,32 @@ def _values_of_rival(
     return estimates(regression, fitted, spread)[index][1]
 
 
-def _gains(engine: SelectionEngine, final: Fit, noise: BandNoise) -> list[float]:
-    """Relative decrease of the held-out χ² by each addition, in the order of selection."""
-    hypothesis = final.hypothesis
-    squares, folds = [], engine.folds(final, noise)
-    for count in range(engine.n_initial_terms, len(hypothesis.terms) + 1):
-        partial = Hypothesis(
-            hypothesis.terms[:count], hypothesis.nuisances, hypothesis.starts[:count]
-        )
-        fitted = final if count == len(hypothesis.terms) else engine.refit(partial, noise)
-        squares.append(float(np.sum(held_out(engine.regression, fitted, noise, folds))))
-    return [1 - after / before for before, after in pairwise(squares)]
+def _growth(engine: SelectionEngine, final: Fit, noise: BandNoise) -> list[Fit]:
+    """The model without additions, with the first one, and so on to the final model."""
+    hypothesis, first = final.hypothesis, engine.n_initial_terms
+    parts = [
+        Hypothesis(hypothesis.terms[:count], hypothesis.nuisances, hypothesis.starts[:count])
+        for count in range(first, len(hypothesis.terms))
+    ]
+    return [*(engine.refit(part, noise) for part in parts), final]
+
+
+def _explained(
+    engine: SelectionEngine,
+    growth: Sequence[Fit],
+    noise: BandNoise,
+    folds: Folds,
+    outputs: Mapping[str, OutputFit],
+) -> list[float]:
+    """Share of the excess before that each addition explains as the model grows; NaN without
+    outputs.
+    """
+    size = {name: output.noise_rms for name, output in outputs.items()}
+    whole = excess({name: output.heldout_rms_before for name, output in outputs.items()}, size)
+    if not whole > 0.0:
+        return [float("nan")] * (len(growth) - 1)
+    left = [excess(engine.held_out_errors(fitted, noise, folds), size) for fitted in growth]
+    return [float(np.clip((before - after) / whole, 0.0, 1.0)) for before, after in pairwise(left)]
 
 
 def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[CandidateScore, ...]:

@@ -26,7 +26,7 @@ from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.steps import alike, doubt_texts, overlap, reported_steps, step_text
+from winchkit.report.words.steps import ErrorFall, alike, doubt_texts, reported_steps, step_text
 from winchkit.report.words.vocabulary import (
     clause,
     combination_text,
@@ -65,14 +65,15 @@ def figures(diagnosis: Diagnosis) -> Markup:
         if known:
             cells.append(quantity(output.signal_rms, output.unit))
         rows.append(cells)
-    caption = f"Held-out error, rms: measured on {diagnosis.data} that the fit had not seen."
+    data = next((output.heldout_on for output in diagnosis.outputs.values()), diagnosis.data)
+    caption = f"Held-out error, rms: measured on {data} that the fit had not seen."
     last_head = ["measured"] if known else []
     return table(caption, [*head, "noise", "÷ noise", *last_head], rows)
 
 
-def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
-    """Every step that is reported, with its doubts; ``without`` as in ``step_lines``."""
-    errors = [*without, *[{}] * len(diagnosis.steps)]
+def steps(diagnosis: Diagnosis, falls: Sequence[ErrorFall] = ()) -> Markup:
+    """Every step that is reported, with its doubts; ``falls`` as in ``step_lines``."""
+    known = dict(enumerate(falls))
     items = []
     for index in reported_steps(diagnosis):
         step = diagnosis.steps[index]
@@ -80,8 +81,7 @@ def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> 
             element("li", capital(text), class_="doubt")
             for text in doubt_texts(step, diagnosis.data)
         ]
-        words = step_text(step, diagnosis.outputs, errors[index], overlaps=overlap(diagnosis))
-        text = unbroken(capital(words))
+        text = unbroken(capital(step_text(step, diagnosis.outputs, known.get(index))))
         items.append(element("li", text, *([element("ul", *doubts)] if doubts else [])))
     return element("ol", *items, class_="found") if items else Markup("")
 

@@ -35,7 +35,7 @@ from winchkit.report.detectability import (
     visible,
 )
 from winchkit.report.figures.unexplained import unexplained_curve
-from winchkit.report.figures.waterfall import errors_without, waterfall_of
+from winchkit.report.figures.waterfall import falls_of, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, entries, hanging, joined, paragraph
 from winchkit.report.words.headline import comparison_headline, noise_text
@@ -51,10 +51,10 @@ from winchkit.report.words.sentence import (
     wrong_channels,
 )
 from winchkit.report.words.steps import (
+    ErrorFall,
     alike,
     doubt_texts,
     named_only,
-    overlap,
     reported_steps,
     step_text,
 )
@@ -114,9 +114,9 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         blocks.append(_candidates(answer))
 
     def steps(most: int | None) -> list[str]:
-        return step_lines(diagnosis, without, most)
+        return step_lines(diagnosis, falls, most)
 
-    without, room = errors_without(answer), _MOST_LINES - 1 - len(joined(blocks).split("\n"))
+    falls, room = falls_of(answer), _MOST_LINES - 1 - len(joined(blocks).split("\n"))
     shorter = (steps(most) for most in range(room, _STEP_LINES, -1))
     fitting = next((lines for lines in shorter if len(lines) <= room), None)
     blocks.insert(1, steps(None) if verbose else fitting or steps(_STEP_LINES))
@@ -152,21 +152,20 @@ def head_lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def step_lines(
-    diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = (), most: int | None = None
+    diagnosis: Diagnosis, falls: Sequence[ErrorFall] = (), most: int | None = None
 ) -> list[str]:
-    """Every step that is reported, the largest share first, with its doubts below.
+    """Every step that is reported, what explains most first, with its doubts below.
 
-    ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
-    from which further steps are named only, as are small ones.
+    ``falls``: held-out errors before and after each step. ``most``: number of lines from which
+    further steps are named only, as are small ones.
     """
     lines: list[str] = []
-    errors = [*without, *[{}] * len(diagnosis.steps)]
+    known = dict(enumerate(falls))
     told = reported_steps(diagnosis)
     small = named_only([diagnosis.steps[index] for index in told], diagnosis.outputs)
-    overlaps = overlap(diagnosis)
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
-        text = step_text(step, diagnosis.outputs, errors[index], overlaps=overlaps)
+        text = step_text(step, diagnosis.outputs, known.get(index))
         own = paragraph(text, f"{number}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
@@ -231,17 +230,16 @@ def addition_text(addition: Addition | Removal) -> str:
 def diagnosed_errors(diagnosis: Diagnosis) -> list[str]:
     """Held-out errors of a diagnosis."""
     extended, offsets = bool(reported_steps(diagnosis)), diagnosis.run_offsets
-    return _errors(diagnosis.outputs, extended=extended, data=diagnosis.data, offsets=offsets)
+    return _errors(diagnosis.outputs, extended=extended, offsets=offsets)
 
 
 def _errors(
     outputs: Mapping[str, OutputFit],
     *,
     extended: bool,
-    data: str = "runs",
     offsets: Sequence[RunOffset] = (),
 ) -> list[str]:
-    """Held-out errors per output, of ``runs`` or ``poses``, with the offsets of each run."""
+    """Held-out errors per output, with the offsets of each run."""
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():
@@ -250,14 +248,15 @@ def _errors(
         after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
         rows.append([output_name(name), before, *after, noise])
+    data = next((output.heldout_on for output in outputs.values()), "runs")
     held_out = f"held out: measured on {data} that the fit had not seen"
     if extended:  # Then values with their deviations stand above.
         held_out = f"± one standard deviation; held out: on {data} that the fit had not seen"
-    if not offsets:
-        return [*aligned(rows), f"  ({held_out})"]
-    own = " and ".join(dict.fromkeys(output_name(o.output) for o in offsets))
-    held_out += f"; the offset of the {own} is estimated from every run itself"
-    return [*aligned(rows), *paragraph(f"({held_out})", "  ", "   "), *_offsets(offsets)]
+    if offsets:
+        own = " and ".join(dict.fromkeys(output_name(o.output) for o in offsets))
+        held_out += f"; the offset of the {own} is estimated from every run itself"
+    lines = [*aligned(rows), *paragraph(f"({held_out})", "  ", "   ")]
+    return [*lines, *_offsets(offsets)] if offsets else lines
 
 
 def _offsets(offsets: Sequence[RunOffset]) -> list[str]:

@@ -26,7 +26,6 @@ from winchkit.report.words.steps import (
     alike,
     doubt_texts,
     has_other_law,
-    overlap,
     reported,
     reported_steps,
     step_text,
@@ -61,7 +60,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
             {
                 "effect": step.effects[0],
                 "certain": step.certain,
-                "text": capital(step_text(step, overlaps=overlap(diagnosis))),
+                "text": capital(step_text(step)),
                 "doubts": [capital(text) for text in doubt_texts(step, diagnosis.data)],
             }
             for step in reported(diagnosis).steps

@@ -26,32 +26,37 @@ OUTPUTS = {"cable_length": NOISY, "tension": AT_NOISE}
 
 
 def test_a_step_has_value_error_without_and_with_it_and_share() -> None:
-    text = step_text(replace(ELASTIC, share=0.99), OUTPUTS, {"cable_length": 1.5e-3, "tension": 1})
+    after = {"cable_length": 0.36e-3, "tension": 1.0}
+    fall = {"cable_length": 1.5e-3, "tension": 1.0}, after
+    text = step_text(replace(ELASTIC, share=0.99), OUTPUTS, fall)
     assert text == (
         "the cable is elastic: EA = 249.9 ± 7.0 kN; cable length 1.50 → 0.360 mm; explains 99 %"
     )
 
 
-def test_shares_of_laws_that_overlap_are_said_to_be_beside_the_others() -> None:
-    """Friction and viscosity at one speed explain all together, and little each."""
-    first, second = replace(ELASTIC, share=0.06), replace(FRICTION, share=0.03)
-    small = " ".join(" ".join(step_lines(diagnosis_of("explained", first, second))).split())
-    assert "explains 6.0 % that the others do not" in small
-    apart = step_lines(diagnosis_of("explained", replace(first, share=0.7), second))
-    assert not any("the others" in line for line in apart)
+def test_of_laws_that_overlap_the_first_explains_most_and_comes_first() -> None:
+    """Friction and viscosity at one speed: each beside the other explains little."""
+    first = replace(ELASTIC, share=0.03, explains=0.9)
+    second = replace(FRICTION, share=0.06, explains=0.07)
+    found = diagnosis_of("explained", first, second)
+    assert reported_steps(found) == [0, 1]
+    assert [line for line in step_lines(found) if "explains 90 %" in line]
+    value = replace(REFITTED, share=0.4)
+    assert reported_steps(diagnosis_of("explained", value, second, first)) == [0, 1, 2]
+    assert reported_steps(diagnosis_of("explained", value, first, second)) == [1, 0, 2]
 
 
 def test_a_step_that_lowers_no_error_shows_none() -> None:
     same = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
-    assert lowered_most(OUTPUTS, same) == ""
-    assert "→" not in step_text(ELASTIC, OUTPUTS, same)
+    assert lowered_most((same, same)) == ""
+    assert "→" not in step_text(ELASTIC, OUTPUTS, (same, same))
     assert "explains" not in step_text(ELASTIC), "an unknown share is no figure"
 
 
 @pytest.mark.parametrize("unit", ["cable_length", "tension"])
 def test_the_output_is_the_one_whose_error_rises_most_without_the_step(unit: str) -> None:
-    without = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
-    assert lowered_most(OUTPUTS, without | {unit: 2 * without[unit]}) == unit
+    after = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
+    assert lowered_most((after | {unit: 2 * after[unit]}, after)) == unit
 
 
 def test_a_set_has_the_values_of_every_kind() -> None:

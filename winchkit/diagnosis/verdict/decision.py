@@ -238,6 +238,7 @@ def output_fits(
             if known
             else _with(max(after[output], size[output]), leakage_after.get(output)),
             p_value=p_values.get(output),
+            heldout_on="runs" if engine.grouped(folds) else "parts of the runs",
         )
         for output in regression.outputs
     }

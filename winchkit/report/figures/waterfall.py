@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.linear_axis import in_units_of
@@ -76,6 +77,24 @@ def errors_without(answer: Answer) -> list[Mapping[str, float]]:
     out = [_without_own(answer, step, ladder) for step in answer.diagnosis.steps[:count]]
     indices = range(engine.n_initial_terms, len(hypothesis.terms))
     return out + [ladder.of(hypothesis.without(index)) for index in indices]
+
+
+def falls_of(answer: Answer) -> list[tuple[Mapping[str, float], Mapping[str, float]]]:
+    """Held-out errors before and after each step, refitted, by output.
+
+    Those of an addition are with the additions before it, as the model grows; of a refitted value
+    they are of the final model with that of the file and with its own.
+    """
+    engine, result = answer.engine, answer.result
+    added = tuple(range(engine.n_initial_terms, len(result.final.hypothesis.terms)))
+    after = {name: output.heldout_rms_after for name, output in answer.diagnosis.outputs.items()}
+    ladder = _Ladder(engine, result, {added: after})
+    own = answer.diagnosis.steps[: _n_own(answer)]
+    grown = [ladder.error(*added[:count]) for count in range(len(added) + 1)]
+    return [
+        *((_without_own(answer, step, ladder), after) for step in own),
+        *pairwise(grown),
+    ]
 
 
 def _n_own(answer: Answer) -> int:

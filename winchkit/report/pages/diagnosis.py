@@ -13,7 +13,7 @@ from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
 from winchkit.report.figures.figure import Figure
-from winchkit.report.figures.waterfall import errors_without, waterfall_of
+from winchkit.report.figures.waterfall import falls_of, waterfall_of
 from winchkit.report.html.markup import Markup, element, facts, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
@@ -94,7 +94,7 @@ def _verdict(answer: Answer, command: CommandLine, title: str, ladder: Figure | 
     known = not diagnosis.interrupted
     rows = [
         ("Compared", compared_text(command.dataset, command.profile)),
-        ("Missing", tables.steps(diagnosis, errors_without(answer))),
+        ("Missing", tables.steps(diagnosis, falls_of(answer))),
         ("Error", error_text(diagnosis)),
         ("Remains", remaining_text(diagnosis)),
         ("Detectable", shown),

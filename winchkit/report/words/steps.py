@@ -1,4 +1,4 @@
-"""Steps of a diagnosis in words: effect, values, error without it and with it, share, doubts."""
+"""Steps of a diagnosis in words: effect, values, error before and after it, share, doubts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from winchkit.report.words.vocabulary import (
 _DISTINCT = 20.0
 """Angle between two signatures from which the data distinguish them, °."""
 _LOWERED = 1.01
-"""Ratio of the errors without and with a step from which it lowers an output's error."""
+"""Ratio of the errors before and after a step from which it lowers an output's error."""
 _LEAST = 1e-3
 """Share below which no figure is shown."""
 _MOST_KINDS = 3
@@ -38,19 +38,27 @@ _MAIN = 0.9
 ``explained``."""
 _NORMAL_95 = 1.96
 """Standard deviations on each side of a 95 % interval, where none was computed."""
-_OVERLAP = 0.5
-"""Sum of the shares, over what all steps explain, below which they are said to overlap."""
+ErrorFall = tuple[Mapping[str, float], Mapping[str, float]]
+"""Held-out errors by output before and after a step, SI."""
 _D = TypeVar("_D", bound=Diagnosis)
 
 
 def reported_steps(diagnosis: Diagnosis) -> list[int]:
-    """Indices of the steps that are reported, the largest share first; robots' without one before.
+    """Indices of the steps that are reported, what explains most first; robots' without a share
+    before. Additions are in the order in which the model grows.
 
     A refitted effect of the profile that explains less than a hundredth, and whose values agree
     with those of the file, is left out unless it alone makes the verdict.
     """
     steps = diagnosis.steps
-    ranked = sorted(range(len(steps)), key=lambda i: -_rank(steps[i]))
+    ranks, least = [], inf
+    for step in steps:
+        if isfinite(step.explains):
+            least = min(least, step.explains)
+            ranks.append(least)
+        else:
+            ranks.append(step.share if isfinite(step.share) else inf)
+    ranked = sorted(range(len(steps)), key=lambda i: -ranks[i])
     told = [i for i in ranked if not _is_negligible(steps[i])]
     return ranked if not told and diagnosis.verdict in {"explained", "partly"} else told
 
@@ -61,8 +69,9 @@ def reported(diagnosis: _D) -> _D:
     return diagnosis if chosen == diagnosis.steps else replace(diagnosis, steps=chosen)
 
 
-def _rank(step: Step) -> float:
-    return step.share if isfinite(step.share) else inf
+def explained_share(step: Step) -> float:
+    """Share of the excess that a step explains beside those before it, or else beside all."""
+    return step.explains if isfinite(step.explains) else step.share
 
 
 def _is_negligible(step: Step) -> bool:
@@ -76,7 +85,7 @@ def _is_negligible(step: Step) -> bool:
 
 def named_only(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> list[Step]:
     """Additions that are doubtful and explain less than a hundredth of the excess each, where the
-    others explain nine tenths without them: overlapping laws have small shares as well.
+    others explain nine tenths without them.
 
     One that explains more than all that is left is none: beside a weight, friction is small.
     """
@@ -84,18 +93,9 @@ def named_only(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> list[
     before = excess({name: output.heldout_rms_before for name, output in outputs.items()}, noise)
     left = sum((outputs[name].heldout_rms_after / n) ** 2 for name, n in noise.items() if n)
     least = min(_NEGLIGIBLE, left / before) if before else _NEGLIGIBLE
-    small = [s for s in steps if not s.certain and not s.refitted and s.share < least]
-    main = sum(step.share for step in steps if step not in small)
+    small = [s for s in steps if not s.certain and not s.refitted and explained_share(s) < least]
+    main = sum(explained_share(step) for step in steps if step not in small)
     return small if main > _MAIN else []
-
-
-def overlap(diagnosis: Diagnosis) -> bool:
-    """Whether most of what the steps explain is explained by several of them: a friction and a
-    viscosity at one speed have small shares, and nothing remains.
-    """
-    explained = 1.0 - diagnosis.unexplained_share
-    shares = [step.share for step in diagnosis.steps]
-    return len(shares) > 1 and sum(shares) < _OVERLAP * explained
 
 
 def _agrees(estimate: Estimate, file_value: float) -> bool:
@@ -146,35 +146,28 @@ def has_other_law(step: Step) -> bool:
 def step_text(
     step: Step,
     outputs: Mapping[str, OutputFit] | None = None,
-    without: Mapping[str, float] | None = None,
-    *,
-    overlaps: bool = False,
+    fall: ErrorFall | None = None,
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
-    ``overlaps``: the steps explain more together than each beside the others.
     """
     parts = [_titled_values(step)]
-    if outputs and without and (name := lowered_most(outputs, without)):
-        output = outputs[name]
-        scale = error_scale(output)
-        then = scale.text(output.heldout_rms_after)
-        before = significant(without[name] / scale.worth)
-        parts.append(f"{output_name(name)} {before} → {then}")
-    if isfinite(step.share):
-        share = percent(step.share) if step.share >= _LEAST else "under 0.1 %"
-        parts.append(f"explains {share}{' that the others do not' if overlaps else ''}")
+    if outputs and fall and (name := lowered_most(fall)):
+        before, after = fall
+        scale = error_scale(outputs[name])
+        was = significant(before[name] / scale.worth)
+        parts.append(f"{output_name(name)} {was} → {scale.text(after[name])}")
+    share = explained_share(step)
+    if isfinite(share):
+        parts.append(f"explains {percent(share) if share >= _LEAST else 'under 0.1 %'}")
     return "; ".join(parts)
 
 
-def lowered_most(outputs: Mapping[str, OutputFit], without: Mapping[str, float]) -> str:
+def lowered_most(fall: ErrorFall) -> str:
     """Output whose error a step lowers most; empty where it lowers none by 1 %."""
-    ratios = {
-        name: without[name] / output.heldout_rms_after
-        for name, output in outputs.items()
-        if name in without and output.heldout_rms_after > 0
-    }
+    before, after = fall
+    ratios = {name: error / after[name] for name, error in before.items() if after.get(name)}
     best = max(ratios, key=ratios.__getitem__, default="")
     return best if best and ratios[best] >= _LOWERED else ""
 

@@ -171,6 +171,7 @@ def output_fits_of(
             noise_rms=least[name],
             noise_source=source,
             noise_upper=None if noise.from_repeats else max(rms(name, after[name]), least[name]),
+            heldout_on="poses",
         )
         for name in after
         if name in before
