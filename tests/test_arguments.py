@@ -1,4 +1,4 @@
-"""Type checks of arguments: which values pass, and what the message says."""
+"""Names and values that callers give: types of arguments, and declarations by name."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from winchkit import catalog
 from winchkit.arguments import require_each, require_type, require_types
 from winchkit.errors import UsageError
 from winchkit.runs.run import Run
@@ -37,3 +38,18 @@ def test_a_long_value_is_cut_and_has_no_control_characters() -> None:
         require_type("\x1b[31m" + "x" * 100, int, "count")
     assert "\\x1b" in str(error.value)
     assert len(str(error.value)) < 90
+
+
+def test_a_file_in_the_folder_is_found_before_a_shipped_one(tmp_path: Path) -> None:
+    bench, own = tmp_path / "bench.toml", tmp_path / "generic-cia402.toml"
+    bench.touch()
+    own.touch()
+    assert catalog.find("devices", "generic-cia402", bench) == own
+
+
+def test_a_file_that_has_the_name_of_its_own_device_means_the_shipped_one(tmp_path: Path) -> None:
+    bench = tmp_path / "generic-cia402.toml"
+    bench.touch()
+    shipped = catalog.folder("devices") / "generic-cia402" / "device.toml"
+    assert catalog.find("devices", "generic-cia402", bench) == shipped
+    assert catalog.find("devices", "generic-cia402", str(bench)) == shipped

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import own_process
 from winchkit import compare, read_profile, read_run
 from winchkit.catalog import find
 
@@ -40,14 +41,9 @@ def needs(*modules: str) -> pytest.MarkDecorator:
 
 
 def winchkit(folder: Path, *words: str) -> str:
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore::DeprecationWarning", "-m", "winchkit", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
+    done = own_process(
+        sys.executable, "-W", "ignore::DeprecationWarning", "-m", "winchkit", *words, cwd=folder
     )
-    assert done.returncode == 0, done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     return done.stdout
 
@@ -172,7 +168,6 @@ def test_web(recorded: Path) -> None:
         text=True,
     ) as process:
         try:
-            assert process.stdout is not None
             url = process.stdout.readline().strip()
             with urllib.request.urlopen(url, timeout=60) as page:
                 assert b"<title>" in page.read()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from contextlib import ExitStack, closing
 import can
 import pytest
 
+from command_line import own_process
 from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 from winchkit.sim.live.buses import wired
@@ -40,7 +40,6 @@ def test_a_frame_reaches_all_but_its_sender(ports: Ports) -> None:
     mine.send(0x181, b"12345678")
     assert other.receive(1.0) == (0x181, b"12345678")
     heard = library.recv(1.0)
-    assert heard is not None
     assert (heard.arbitration_id, bytes(heard.data), heard.is_extended_id) == (
         0x181, b"12345678", False,
     )  # fmt: skip
@@ -94,19 +93,15 @@ def test_a_group_on_the_loopback_is_reached_beside_a_network() -> None:
     """The route to the group decides where frames go, not that to everything else."""
     if shutil.which("unshare") is None or shutil.which("ip") is None:
         pytest.skip("no unshare or no ip here")
-    made = subprocess.run(
-        ["unshare", "-rn", "sh", "-ec", f"{_TWO_INTERFACES}exec {sys.executable} -c 'pass'"],
-        check=False,
-        capture_output=True,
-        text=True,
+    made = own_process(
+        "unshare",
+        "-rn",
+        "sh",
+        "-ec",
+        f"{_TWO_INTERFACES}exec {sys.executable} -c 'pass'",
+        code=None,
     )
     if made.returncode:
         pytest.skip(f"no second network here: {made.stderr.strip()}")
     script = f'{_TWO_INTERFACES}exec "$0" -c "$1"'
-    done = subprocess.run(
-        ["unshare", "-rn", "sh", "-ec", script, sys.executable, _EXCHANGE],
-        check=False,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    own_process("unshare", "-rn", "sh", "-ec", script, sys.executable, _EXCHANGE)

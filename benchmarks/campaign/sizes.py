@@ -56,7 +56,7 @@ CATALOGUED = {
 
 def allowed(effect: str, winch: Winch, load_known: bool, warms: bool, loads: int) -> bool:
     """Whether an effect can act, and show, on a winch and its channels."""
-    if effect.startswith("gear-") and winch.ratio == 1:
+    if effect.startswith("gear-") and effect != "gear-efficiency" and winch.ratio == 1:
         return False
     if effect == "outside-harmonic":
         return abs(5 / winch.ratio - round(5 / winch.ratio)) > 0.02

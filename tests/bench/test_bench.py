@@ -163,8 +163,6 @@ def test_a_silent_cell_stops_the_winch(bench: Bench, live: LiveBench) -> None:
 
 def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None:
     station, other = attach(bench.spec), attach(bench.spec)
-    assert station is not None
-    assert other is not None
     try:
         assert station.names() == ["A"]
         other.start_log(str(tmp_path / "other.csv"))
@@ -202,7 +200,6 @@ def test_a_log_of_a_station_that_cannot_go_on_disturbs_no_other(
     until(lambda: any("logging failed" in text for text in station.status()["warnings"]))
     station.close()
     other = attach(bench.spec)
-    assert other is not None
     cycle = other.status()["cycle"]
     until(lambda: other.status()["cycle"] > cycle)
     other.close()
@@ -210,7 +207,6 @@ def test_a_log_of_a_station_that_cannot_go_on_disturbs_no_other(
 
 def test_a_station_that_goes_away_releases_its_winches(bench: Bench) -> None:
     station = attach(bench.spec)
-    assert station is not None
     station.step("A", pay_out=0.6, speed=0.1)
     until(lambda: bench.winch["A"].snapshot.cable_speed > 0.05)
     station.close()

@@ -1,20 +1,27 @@
-"""In what the simulated drives of the families differ, seen through each one's own files."""
+"""Every drive that has a device file: its simulated one moves, and in what the families differ."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
 import pytest
 
-from winchkit import catalog
+from winchkit import catalog, open_bench
+from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import ServoSpec
-from winchkit.schema.read import read_device
+from winchkit.schema.read import read_device, read_simbench
+from winchkit.schema.simbench import NoiseSpec, SimBench
 from winchkit.sim.drive.drive import SimDrive
 from winchkit.sim.drive.object_dictionary import Abort, Entry, ObjectDictionary
 from winchkit.sim.drive.object_dictionary import read_eds as read_for_simulation
+from winchkit.sim.live.bench import LiveBench
+from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.sim.plant.servo import DriveCommand
 
 VENDORS = {
@@ -199,3 +206,58 @@ def test_a_slow_boot_is_as_slow_as_declared(name: str) -> None:
     assert not bench.frames
     bench.run(0.3 * declared)
     assert bench.frames[0] == (0x701, b"\0")
+
+
+def declared_servo(name: str) -> ServoSpec | None:
+    return read_device(catalog.find("devices", name)).servo
+
+
+DRIVES = [name for name in catalog.names("devices") if declared_servo(name) is not None]
+
+
+def bench_with(device: str) -> SimBench:
+    declared = read_simbench(catalog.find("sim", "spiral-bench"))
+    wiring = declared.bench.winch["A"]
+    wiring = replace(wiring, servo=replace(wiring.servo, device=device))
+    bench = replace(declared.bench, winch={"A": wiring})
+    return replace(declared, bench=bench, noise=NoiseSpec(), fault=())
+
+
+@pytest.fixture
+def clock() -> PacedClock:
+    return PacedClock()
+
+
+@pytest.fixture
+def live(request: pytest.FixtureRequest, clock: PacedClock) -> Iterator[LiveBench]:
+    with LiveBench(bench_with(request.param), seed=3, clock=clock.simulation) as running:
+        yield running
+
+
+def test_there_are_the_families_of_a_winch_bench() -> None:
+    assert len(DRIVES) >= 8
+    makers = {read_device(catalog.find("devices", name)).maker for name in DRIVES}
+    assert len(makers) >= 7
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("live", DRIVES, indirect=True)
+def test_its_simulated_drive_is_commissioned_and_jogged(live: LiveBench, clock: PacedClock) -> None:
+    with open_bench(live.bench_spec, clock) as bench:
+        bench.on_cycle(clock.control)
+        winch = bench.winch["A"]
+        start, plant = winch.cable_length, live.winches["A"].plant
+        turned, wound = plant.motor_angle, plant.cable_length
+        if not winch.snapshot.length_known:
+            winch.home(at=wound)
+            start = winch.cable_length
+        winch.jog(wind_in=0.2, duration=0.5)
+        assert winch.snapshot.phase is Phase.DISABLED
+        gone = start - winch.cable_length
+        # The ramp at its end makes up for that at its begin.
+        assert gone == pytest.approx(0.2 * 0.5, abs=0.02)
+        assert wound - plant.cable_length == pytest.approx(gone, abs=2e-3)
+        assert plant.motor_angle - turned > 10.0
+        snapshot = winch.snapshot
+        assert math.isfinite(snapshot.cable_speed)
+    assert abs(plant.motor_velocity) < 1e-3

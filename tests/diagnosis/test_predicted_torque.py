@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from model_files import invoke
+from command_line import invoke
 from winchkit import compare, diagnose, read_profile, read_run
 from winchkit.arrays import Array
 

@@ -7,11 +7,11 @@ The amplitudes to compare with are least squares on the raw samples, in the READ
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
+from recordings_of_others import folder
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import series_orders
@@ -27,19 +27,7 @@ COGGING = {7: 0.048, 28: 0.031, 14: 0.019, 36: 0.016, 12: 0.015, 84: 0.007}
 """Amplitudes of the largest orders per turn, N m."""
 MAPS = ("map-a_16", "map-b_16", "map-d_16")
 """In map-c orders 7 and 21 have the opposite sign (phase + π): it is no repeat of the others."""
-
-
-def folder() -> Path | None:
-    """Where the recordings are, if they are anywhere."""
-    beside = [parent / "shared" / "data" / "real" for parent in Path(__file__).resolve().parents]
-    told = os.environ.get(VARIABLE)
-    for place in [Path(told)] if told else beside:
-        if (place / "odrive-cogging").is_dir() and (place / "openarm-j4").is_dir():
-            return place
-    return None
-
-
-DATA = folder()
+DATA = folder(VARIABLE, "real", "odrive-cogging", "openarm-j4")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(

@@ -8,7 +8,6 @@ they are looked for in the folder that WINCHKIT_EMPS names, and beside the check
 
 from __future__ import annotations
 
-import os
 from functools import cache
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from recordings_of_others import folder
 from winchkit.diagnosis.add import Addition, add
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
@@ -58,19 +58,7 @@ inertia = "95.11 kg m^2"
 id = "motor-viscous"
 viscosity = "203.5 N m s"
 """
-
-
-def folder() -> Path | None:
-    """Where the data are, if they are anywhere."""
-    beside = [parent / "shared" / "data" / "emps" for parent in Path(__file__).resolve().parents]
-    told = os.environ.get(VARIABLE)
-    for place in [Path(told)] if told else beside:
-        if (place / "train.csv").is_file() and (place / "test.csv").is_file():
-            return place
-    return None
-
-
-DATA = folder()
+DATA = folder(VARIABLE, "emps", "train.csv", "test.csv")
 pytestmark = pytest.mark.skipif(
     DATA is None, reason=f"the EMPS data are not here; {VARIABLE} names the folder that has them"
 )

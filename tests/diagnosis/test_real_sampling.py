@@ -6,12 +6,10 @@ beside the checkout in ``shared/data/real``; the tests are skipped where there a
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from recordings_of_others import folder
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.standstill import standstill_mask
@@ -19,19 +17,7 @@ from winchkit.runs import read_run
 from winchkit.schema.read import read_profile
 
 VARIABLE = "WINCHKIT_REAL"
-
-
-def folder() -> Path | None:
-    """Where the data are, if they are anywhere."""
-    beside = [parent / "shared" / "data" / "real" for parent in Path(__file__).resolve().parents]
-    given = os.environ.get(VARIABLE)
-    for place in [Path(given)] if given else beside:
-        if (place / "openarm-j4" / "collect.csv").is_file():
-            return place
-    return None
-
-
-DATA = folder()
+DATA = folder(VARIABLE, "real", "openarm-j4/collect.csv")
 pytestmark = pytest.mark.skipif(
     DATA is None, reason=f"the recordings are not here; {VARIABLE} names the folder that has them"
 )

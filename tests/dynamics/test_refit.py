@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from winchkit import add, read_profile, write_run
 from winchkit.dynamics import refit
 from winchkit.dynamics.comparison import simulated_errors
@@ -123,14 +123,14 @@ def test_a_wrong_sign_is_named_and_nothing_is_written(tmp_path: Path) -> None:
     source, run, out = axis(tmp_path, 0.9), tmp_path / "r1.csv", tmp_path / "better.toml"
     write_run(reversed_torque(recorded(1, stops=True)), run)
     command = ("add", "motor-viscous", "--fit", run, "-p", source, "-o", out)
-    for done in (
+    for result in (
         invoke(*command, "--refit", "motion"),
         invoke("compare", run, "-p", source, "--forward"),
     ):
-        assert done.exit_code == 3
-        assert "motor_torque: the sign looks inverted" in done.stderr
-        assert "--column 'motor_torque=-motor_torque [N m]'" in done.stderr
-        assert "inertia" not in done.stderr
+        assert result.exit_code == 3
+        assert "motor_torque: the sign looks inverted" in result.stderr
+        assert "--column 'motor_torque=-motor_torque [N m]'" in result.stderr
+        assert "inertia" not in result.stderr
     assert not out.exists()
     assert "motor_torque: the sign looks inverted" in " ".join(invoke(*command).stdout.split())
 
@@ -179,11 +179,10 @@ def test_missing_torque_at_the_ends_is_cut_and_a_long_gap_is_named(tmp_path: Pat
 def test_the_command_writes_the_values_of_the_motion(tmp_path: Path) -> None:
     source, run, out = axis(tmp_path, 0.9), tmp_path / "r1.csv", tmp_path / "better.toml"
     write_run(recorded(1, stops=True), run)
-    done = invoke(
+    result = done(
         "add", "motor-viscous", "--fit", run, "-p", source, "--refit", "motion", "-o", out
     )
-    assert done.exit_code == 0
-    text = " ".join(done.stdout.split())
+    text = " ".join(result.stdout.split())
     assert "simulated from the measured torque, the motion is off by" in text
     (error,) = simulated_errors([recorded(1, stops=True)], read_profile(out))
     until = error.meaningful_until

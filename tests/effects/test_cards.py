@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from command_line import own_process
 from effect_lines import ALL_IDS, CATALOGUE, MINE
 from winchkit.cli.model.effects import command
 from winchkit.effects import Effect
@@ -100,5 +100,5 @@ def test_the_catalogue_needs_neither_scipy_nor_a_bus() -> None:
         "heavy = {'scipy', 'can', 'canopen', 'pymodbus', 'pydantic', 'rich'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = own_process(sys.executable, "-c", code)
     assert done.stdout.strip() == "[]"

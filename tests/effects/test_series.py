@@ -1,6 +1,8 @@
-"""Harmonic series: one effect with several orders."""
+"""Series of harmonics, and grids and bounds of shapes that are placed in the range of the data."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +11,11 @@ from hypothesis import strategies as st
 
 from effect_lines import CATALOGUE
 from winchkit.effects import Term
+from winchkit.effects.location import located
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.series import fundamentals, harmonic_series, orders_of, single_orders
+from winchkit.effects.transition import TRANSITION, with_free_transition
 from winchkit.model.line import Line
 
 COGGING = CATALOGUE["motor-cogging"]
@@ -76,3 +80,40 @@ def test_every_order_is_a_multiple_of_a_fundamental(orders: list[int]) -> None:
     found = fundamentals(orders)
     assert all(any(order % k == 0 for k in found) for order in orders) or not found
     assert 1 not in found
+
+
+def test_an_extent_and_its_bound_are_shares_of_the_range() -> None:
+    at = standard_motion().at
+    effect, extent = CATALOGUE["motor-dahl"], np.ptp(at.motor_angle)
+    declared, found = (e.parameter("distance") for e in (effect, located(effect, [at])))
+    shares = [share for share in declared.grid if share * extent < declared.high]
+    assert 0 < len(shares) < len(declared.grid), "a longer distance is no presliding"
+    assert found.grid == pytest.approx([share * extent for share in shares])
+    assert found.low == pytest.approx(found.grid[0] / 10)
+
+
+def test_a_place_keeps_its_bounds_and_other_effects_are_unchanged() -> None:
+    at = standard_motion().at
+    effect = CATALOGUE["friction-at-place"]
+    found = located(effect, [at]).parameter("place")
+    assert (found.low, found.high) == (
+        effect.parameter("place").low,
+        effect.parameter("place").high,
+    )
+    assert located(CATALOGUE["motor-coulomb"], [at]) is CATALOGUE["motor-coulomb"]
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter"), [("torque-lag", "time_constant"), ("torque-lead", "lead")]
+)
+def test_a_delay_is_within_a_filter_and_a_bus_or_two_samples(name: str, parameter: str) -> None:
+    at = standard_motion().at
+    found = located(CATALOGUE[name], [at]).parameter(parameter)
+    assert (found.low, found.high) == (0.0, 0.2)
+    slow = replace(at, time=np.arange(len(at.time)) * 0.5)
+    assert located(CATALOGUE[name], [slow]).parameter(parameter).high == 1.0
+
+
+def test_a_transition_is_fitted_up_to_the_largest_that_is_one() -> None:
+    found = with_free_transition(CATALOGUE["motor-coulomb"], 0.1).parameter(TRANSITION)
+    assert 0.0 < found.low < found.high == 0.1

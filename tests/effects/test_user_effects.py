@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done
 from winchkit.effects import Effect, load_catalogue
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.user_effects import broken_promises
@@ -96,6 +96,5 @@ def test_what_breaks_them_is_reported_with_its_file(
 
 def test_a_command_ends_with_a_bad_file(tmp_path: Path) -> None:
     file = written(tmp_path, "value + 1")
-    done = invoke("effects", "mine", "--effects", file)
-    assert done.exit_code == 3
-    assert "at its null" in done.stderr
+    result = done("effects", "mine", "--effects", file, code=3)
+    assert "at its null" in result.stderr

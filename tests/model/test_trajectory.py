@@ -1,6 +1,9 @@
-"""A planned move against its limits, its end and numerical integration."""
+"""Planned moves of the model and of the simulator: their limits, their end and closed forms."""
 
 import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,72 +12,100 @@ from hypothesis import strategies as st
 
 from winchkit.errors import UsageError
 from winchkit.model.trajectory import plan
+from winchkit.sim.plant.trajectory import plan as simulated_plan
 
-limits = st.floats(1e-2, 20.0)
+Plan = Callable[[float, float, float, float], Any]
+limits, jerks = st.floats(1e-2, 20.0), st.floats(0.05, 500.0)
+distances = st.floats(-20.0, 20.0).filter(lambda d: abs(d) > 1e-6)
+both = pytest.mark.parametrize("planned", [plan, simulated_plan], ids=["model", "simulator"])
 
 
-@given(
-    distance=st.floats(-20.0, 20.0).filter(lambda d: abs(d) > 1e-6),
-    speed=limits,
-    acceleration=limits,
-    jerk=st.floats(0.1, 500.0),
-)
+@both
+@given(distance=distances, speed=limits, acceleration=limits, jerk=jerks)
 def test_keeps_every_limit_and_arrives_at_rest(
-    distance: float, speed: float, acceleration: float, jerk: float
+    planned: Plan, distance: float, speed: float, acceleration: float, jerk: float
 ) -> None:
-    move = plan(distance, speed, acceleration, jerk)
-    time = np.linspace(-0.1, move.duration + 0.1, 801)
-    s, v, a = move.at(time)
-    assert s[0] == 0
-    assert s[-1] == pytest.approx(distance, rel=1e-9)
-    assert v[0] == v[-1] == 0
-    assert np.max(np.abs(v)) <= speed * (1 + 1e-9)
-    assert np.max(np.abs(a)) <= acceleration * (1 + 1e-9)
-    step = (s[1:] - s[:-1]) * math.copysign(1, distance)
-    assert np.all(step >= -1e-9 * abs(distance))
+    move = planned(distance, speed, acceleration, jerk)
+    assert move.at(-1.0)[:2] == (0.0, 0.0)
+    assert move.at(move.duration + 0.1)[:2] == (pytest.approx(distance, rel=1e-9), 0.0)
+    assert move.at(move.duration * (1 - 1e-9))[0] == pytest.approx(distance, abs=1e-6)
+    step = move.duration / 400
+    way, velocity = np.array([move.at(k * step)[:2] for k in range(401)]).T
+    assert np.all(np.diff(way) * math.copysign(1, distance) >= -1e-9 * abs(distance))
+    assert np.max(np.abs(velocity)) <= speed * (1 + 1e-9)
+    if move.duration > 1e-3:
+        slopes = np.diff(velocity) / step
+        assert np.max(np.abs(slopes)) <= acceleration * (1 + 1e-6)
+        assert max(abs(b - a) for a, b in pairwise(slopes)) <= step * jerk * (1 + 1e-6) + 1e-6
 
 
-@given(distance=st.floats(0.01, 5.0), speed=limits, acceleration=limits, jerk=limits)
-def test_speed_is_the_derivative_of_position(
-    distance: float, speed: float, acceleration: float, jerk: float
+@both
+@given(distance=st.floats(0.01, 20.0), speed=limits, acceleration=limits, jerk=jerks)
+def test_speed_is_the_derivative_of_distance(
+    planned: Plan, distance: float, speed: float, acceleration: float, jerk: float
 ) -> None:
-    move = plan(distance, speed, acceleration, jerk)
+    move = planned(distance, speed, acceleration, jerk)
     h = move.duration * 1e-5
-    time = np.linspace(2 * h, move.duration - 2 * h, 57)
-    s_before, v_before, _ = move.at(time - h)
-    s_after, v_after, _ = move.at(time + h)
-    _, v, a = move.at(time)
-    assert np.allclose((s_after - s_before) / (2 * h), v, atol=jerk * h**2 + 1e-12 * distance / h)
-    assert np.allclose((v_after - v_before) / (2 * h), a, atol=jerk * h + 1e-12 * speed / h)
+    for time in np.linspace(2 * h, move.duration - 2 * h, 17):
+        slope = (move.at(time + h)[0] - move.at(time - h)[0]) / (2 * h)
+        tolerance = jerk * h**2 + 1e-12 * distance / h
+        assert slope == pytest.approx(move.at(time)[1], abs=tolerance)
 
 
 @given(distance=st.floats(0.01, 5.0), speed=limits, acceleration=limits, jerk=limits)
-def test_one_limit_is_always_reached(
+def test_the_model_gives_the_acceleration_and_reaches_one_limit(
     distance: float, speed: float, acceleration: float, jerk: float
 ) -> None:
     """Otherwise a faster move would exist."""
     move = plan(distance, speed, acceleration, jerk)
-    assert np.max(move.speed) == pytest.approx(speed) or move.start[4] == pytest.approx(
-        move.start[3]
-    )
+    h = move.duration * 1e-5
+    time = np.linspace(2 * h, move.duration - 2 * h, 57)
+    slope = (move.at(time + h)[1] - move.at(time - h)[1]) / (2 * h)
+    assert np.allclose(slope, move.at(time)[2], atol=jerk * h + 1e-12 * speed / h)
+    assert np.max(np.abs(move.at(time)[2])) <= acceleration * (1 + 1e-9)
+    reached = np.max(move.speed) == pytest.approx(speed)
+    assert reached or move.start[4] == pytest.approx(move.start[3])
 
 
-def test_known_move() -> None:
-    """1 m at 1 m/s, 2 m/s^2, 8 m/s^3: ramps of 0.25 + 0.5 s, by hand."""
-    move = plan(-1.0, 1.0, 2.0, 8.0)
-    assert move.duration == pytest.approx(1.0 + 0.75)
-    assert move.at(move.duration / 2)[0] == pytest.approx(-0.5)
+@both
+@pytest.mark.parametrize(
+    ("speed", "acceleration", "jerk", "duration"),
+    [
+        # Worked by hand: 1 m at 0.5 m/s, 1 m/s², 2 m/s³: ramps of 0.5/1 + 0.5 s, then cruise.
+        (0.5, 1.0, 2.0, 1 / 0.5 + 0.5 / 1.0 + 1.0 / 2.0),
+        (1.0, 2.0, 8.0, 1.0 + 0.75),
+        # No cruise, no constant acceleration: 4 (d / 2j)^(1/3).
+        (100.0, 100.0, 4.0, 4 * (1.0 / 8.0) ** (1 / 3)),
+    ],
+)
+def test_duration_by_hand(
+    planned: Plan, speed: float, acceleration: float, jerk: float, duration: float
+) -> None:
+    move = planned(-1.0, speed, acceleration, jerk)
+    assert move.duration == pytest.approx(duration)
+    assert move.at(duration / 2)[0] == pytest.approx(-0.5)
 
 
-@pytest.mark.parametrize("bad", [0.0, -1.0, math.inf, math.nan])
-def test_limits_that_cannot_be_meant_are_refused(bad: float) -> None:
-    with pytest.raises(UsageError, match="speed limit"):
-        plan(1.0, bad, 1.0, 1.0)
+@both
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_limit_must_be_positive(planned: Plan, bad: float, place: int) -> None:
+    given = [1.0, 1.0, 1.0]
+    given[place] = bad
+    with pytest.raises(UsageError, match=r"(speed|acceleration|jerk) limit|must be positive"):
+        planned(1.0, *given)
+
+
+@pytest.mark.parametrize("bad", [math.inf, math.nan])
+def test_a_move_that_cannot_be_meant_is_refused(bad: float) -> None:
     with pytest.raises(UsageError, match="cannot be planned"):
-        plan(math.nan, 1.0, 1.0, 1.0)
+        plan(bad, 1.0, 1.0, 1.0)
+    with pytest.raises(UsageError, match="speed limit"):
+        plan(1.0, math.inf, 1.0, 1.0)
 
 
-def test_no_distance_takes_no_time() -> None:
-    move = plan(0.0, 1.0, 1.0, 1.0)
+@both
+def test_no_distance_takes_no_time(planned: Plan) -> None:
+    move = planned(0.0, 1.0, 1.0, 1.0)
     assert move.duration == 0
     assert move.at(1.0)[0] == 0

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.cli import main
+from command_line import done
 from winchkit.errors import FileError, UsageError
 from winchkit.model.sizing.parts import belt_length, centre_distance
 from winchkit.model.sizing.row import Row, down, up
@@ -30,8 +30,8 @@ def row(spec: SizeSpec, name: str) -> Row:
     return found
 
 
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(main, ["size", *map(str, arguments)])
+def invoke(*arguments: object, code: int = 0) -> Result:
+    return done("size", *arguments, code=code)
 
 
 def number(text: str) -> float:
@@ -187,8 +187,7 @@ def test_belts_that_cannot_be_are_refused() -> None:
 
 
 def test_the_table_of_the_command_line() -> None:
-    result = invoke(EXAMPLE)
-    assert result.exit_code == 1
+    result = invoke(EXAMPLE, code=1)
     assert re.search(r"motor torque +Eq\. 13 +2\.452 N m +<= +1\.273 N m +FAILS", result.stdout)
     assert (
         "would do: a gear ratio from 57.8 to 314 of the same efficiency; offered: 60, 80, 100"
@@ -202,7 +201,6 @@ def test_the_json_of_the_command_line(tmp_path: Path) -> None:
     text = EXAMPLE.read_text(encoding="utf-8")
     file.write_text(text.replace("ratio = 30", "ratio = 60").replace('"300 mm"', '"330 mm"'))
     result = invoke(file, "--json")
-    assert result.exit_code == 0
     answer = json.loads(result.stdout)
     assert (answer["schema"], answer["name"], answer["ok"]) == (1, "winding-device", True)
     rows = {each["name"]: each for each in answer["requirements"]}
@@ -229,8 +227,7 @@ def test_faults_of_a_specification_are_reported(
     text = EXAMPLE.read_text(encoding="utf-8")
     assert old in text
     file.write_text(text.replace(old, new, 1))
-    result = invoke(file)
-    assert result.exit_code == 3
+    result = invoke(file, code=3)
     assert said in result.stderr
     assert re.match(rf"{re.escape(str(file))}:\d+: ", result.stderr)
 

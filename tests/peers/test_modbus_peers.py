@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from command_line import own_process
 from served import Served
 from waiting import until
 from winchkit import catalog
@@ -40,7 +41,7 @@ def mbpoll(served: Served, *arguments: str, values: tuple[str, ...] = ()) -> tup
         where, port = served.line.address
         line = ["-m", "tcp", "-p", str(port)]
     words = ["mbpoll", *line, "-a", "1", "-0", "-1", "-o", "1", *arguments, where, *values]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=30, check=False)
+    done = own_process(*words, code=None)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -111,7 +112,6 @@ def bus(server: Path, request: pytest.FixtureRequest) -> Iterator[BusSpec]:
     process = subprocess.Popen(
         [server, cable.near if cable else "tcp"], stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     told = process.stdout.readline().strip()
     try:
         if cable:
@@ -133,7 +133,6 @@ def test_our_reader_reads_and_tares_libmodbus(bus: BusSpec) -> None:
     try:
         until(lambda: instrument.counters.readings > 10)
         reading = instrument.latest
-        assert reading is not None
         assert reading.value == pytest.approx(-25.0)
         assert reading.gross == pytest.approx(123.45)
         assert slow.identify(instrument)["serial number"] == 815

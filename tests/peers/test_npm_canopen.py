@@ -57,7 +57,6 @@ class Peer:
         assert self._answer() == "ready"
 
     def ask(self, *request: Any) -> Any:
-        assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
         return self._answer()
@@ -77,7 +76,6 @@ class Peer:
         self._process.communicate(timeout=10)
 
     def _answer(self) -> Any:
-        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         assert line, "the peer has ended"
         return json.loads(line)

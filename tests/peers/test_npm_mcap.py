@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from command_line import own_process
 from npm_install import install
 from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 from winchkit.runs.recording.open_log import open_log
@@ -50,15 +50,7 @@ def written(path: Path) -> SourceSamples:
 
 
 def read(path: Path, modules: Path) -> Any:
-    done = subprocess.run(
-        ["node", str(PEER), str(path)],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "NODE_PATH": str(modules)},
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr[-1000:]
+    done = own_process("node", PEER, path, env={**os.environ, "NODE_PATH": str(modules)})
     return json.loads(done.stdout)
 
 

@@ -1,4 +1,4 @@
-"""A profile from the values of a drawing: each is read back, and nothing is invented."""
+"""Profiles from the values of a drawing, each read back and nothing invented, and their names."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done
 from winchkit import find
 from winchkit.errors import UsageError
 from winchkit.profile_edit.drawing import DRUMS, FIELDS
+from winchkit.profile_edit.naming import extended_name
 from winchkit.profile_edit.new_profile import new_profile
 from winchkit.schema.read import read_profile
 
@@ -95,10 +96,32 @@ def test_the_terminal_asks_until_the_answer_can_be_read(
     answers = ["grooved", "60", "60 mm", "5 mm", "", "20.4", *[""] * 9, "4 m", "", "40 mm", ""]
     target = tmp_path / "asked.toml"
     typed = "\n".join([*answers, ""])
-    found = invoke("profile", "new", target, input=typed)
-    assert found.exit_code == 0, found.output
+    found = done("profile", "new", target, input=typed)
     assert "'60' has no unit" in found.output
     own = read_profile(target)
     values = own.drum.kind, own.drum.groove_pitch, own.reference.cable_length
     assert values == ("grooved", 5e-3, 4.0)
     assert [pulley.radius for pulley in own.pulley] == [0.04]
+
+
+@pytest.mark.parametrize(
+    ("profile", "effects", "name"),
+    [
+        ("bench-spiral", ["drum-radius"], "bench-spiral-drum-radius.toml"),
+        ("there/own.toml", ["drum-radius"], "own-drum-radius.toml"),
+        ("release-1.2", ["drum-radius"], "release-1.2-drum-radius.toml"),
+        ("cabtive", ["swivel-radius/3"], "cabtive-swivel-radius-3.toml"),
+        (Path("a/own.toml"), [], "own.toml"),
+    ],
+)
+def test_the_name_has_the_profile_and_its_additions(
+    profile: str | Path, effects: list[str], name: str
+) -> None:
+    assert extended_name(profile, *effects) == name
+
+
+def test_one_addition_after_another_has_the_name_of_both_at_once() -> None:
+    first = extended_name("bench-spiral", "drum-radius")
+    assert extended_name(first, "cable-creep") == extended_name(
+        "bench-spiral", "drum-radius", "cable-creep"
+    )

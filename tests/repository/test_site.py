@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import runpy
-import subprocess
 import sys
 import tomllib
 from importlib.util import find_spec
@@ -13,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from command_line import own_process
 from snippets import ROOT
 
 made = runpy.run_path(str(ROOT / "docs/make_site.py"))
@@ -79,14 +79,7 @@ def test_a_notebook_is_a_page_with_its_outputs(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("zensical") is None, reason="zensical is in the extra 'docs'")
 def test_the_site_is_built_without_a_warning() -> None:
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "docs/make_site.py")],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    own_process(sys.executable, str(ROOT / "docs/make_site.py"))
     html = ROOT / "docs/site/html"
     assert "Tutorials" in (html / "index.html").read_text(encoding="utf-8")
     assert (html / "search.json").stat().st_size > 100_000

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
 
+from command_line import own_process
 from stalls import StallWatch, stolen
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="schedstat of Linux")
@@ -40,7 +40,7 @@ print(watch.largest)
 def test_a_thread_that_waits_for_the_processor_shows() -> None:
     """A process of the lowest class on one processor, beside busy ones."""
     script = STARVED.format(tests=str(SUPPORT), busy=2)
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    run = own_process(sys.executable, "-c", script)
     assert float(run.stdout) > 0.05
 
 

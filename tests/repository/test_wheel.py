@@ -13,6 +13,7 @@ from zipfile import ZipFile
 
 import pytest
 
+from command_line import own_process
 from snippets import ROOT
 
 pytestmark = pytest.mark.skipif(
@@ -21,16 +22,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def python(*arguments: str, **options: object) -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=250,
-        **options,  # type: ignore[call-overload]
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done
+    return own_process(sys.executable, *arguments, **options)
 
 
 VERSION = "7.8.9.dev1"
@@ -129,14 +121,8 @@ def test_it_runs_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
     def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [str(programs / program), *arguments],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=280,
-            check=False,
+        return own_process(
+            str(programs / program), *arguments, code=None, cwd=tmp_path, env=environment
         )
 
     # Of all that is installed, a few modules are used.

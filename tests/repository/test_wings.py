@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint
@@ -13,7 +12,7 @@ from typing import ClassVar
 import click
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke, own_process
 from snippets import ROOT
 from winchkit import wings
 from winchkit.cli import main
@@ -28,8 +27,7 @@ _COMMAND = "from winchkit.cli import main\ntry:\n    main({words!r})\nexcept Sys
 
 def loads_no_wing(code: str, folder: Path) -> None:
     words = [sys.executable, "-c", code + _SEEN]
-    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    own_process(*words, cwd=folder)
 
 
 def recorded(folder: Path) -> Path:
@@ -118,5 +116,4 @@ def test_another_distribution_adds_a_kind_of_profile_and_a_command(tmp_path: Pat
 
 
 def test_a_command_that_no_wing_has_is_refused() -> None:
-    found = invoke("slew")
-    assert found.exit_code == 2
+    done("slew", code=2)

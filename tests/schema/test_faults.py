@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from declared import BENCH, RADIUS, SIZES, WINCH, faults_of
+from winchkit.catalog import find
 from winchkit.errors import FileError
 from winchkit.schema import read
-from winchkit.schema.read import read_any
+from winchkit.schema.read import load, read_any
 
 GROWTH = "drum.layer_growth"
 
@@ -196,3 +197,146 @@ def test_a_device_has_not_the_number_of_the_host(bench: Path, node: int, host: s
 def test_a_bench_without_a_winch(bench: Path) -> None:
     faults = faults_of(bench, 'schema = 1\nkind = "bench"\nbus = {}\nwinch = {}\n')
     assert [(line, key) for line, key, _ in faults] == [(4, "winch")]
+
+
+_PER_SECOND = "'Hz' is a unit of frequency; write a number per second without a unit"
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "old", "new", "sentence"),
+    [
+        ("devices", "laumas-tlb", "rate = 300.0", 'rate = "50 Hz"', _PER_SECOND),
+        ("devices", "generic-line", "rate = 100.0", 'rate = "50 Hz"', _PER_SECOND),
+        (
+            "devices",
+            "generic-modbus",
+            "rate = 100.0",
+            'rate = "50 %"',
+            "'%' is a unit of ratio; write a number per second without a unit",
+        ),
+        (
+            "devices",
+            "laumas-tlb",
+            "rate = 300.0",
+            'rate = "50 foo"',
+            "unknown unit 'foo'; write a number per second without a unit",
+        ),
+        (
+            "devices",
+            "laumas-tlb",
+            "rate = 300.0",
+            "rate = true",
+            "expected a number per second, not bool",
+        ),
+        (
+            "profiles",
+            "bench-spiral",
+            "ratio = 20.4",
+            'ratio = "20.4 mm"',
+            "'mm' is a unit of length; write a number without a unit",
+        ),
+        (
+            "profiles",
+            "bench-spiral",
+            '"60 mm"',
+            '"60 N"',
+            "'N' is a unit of force, not of length; use one of m, mm, cm, um, km",
+        ),
+        (
+            "profiles",
+            "winding-device-winch",
+            "efficiency = 0.68",
+            'efficiency = "0.68 W"',
+            "'W' is a unit of power; write a ratio without a unit, or in %, ppm",
+        ),
+        (
+            "sim",
+            "cabtive-robot",
+            'rotation_speed = "20 deg/s"',
+            'rotation_speed = "20 deg"',
+            "'deg' is a unit of angle, not of angular speed; use one of rad/s, deg/s",
+        ),
+    ],
+)
+def test_the_sentence_fits_the_field(
+    tmp_path: Path, kind: str, name: str, old: str, new: str, sentence: str
+) -> None:
+    text = find(kind, name).read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "declared.toml"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(FileError) as caught:
+        load(file)
+    assert any(sentence in fault.message for fault in caught.value.faults)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "part"),
+    [
+        ('schema = 1\nkind = "winch"\n[drum\n', 3, "TOML syntax"),
+        ('schema = 1\nkind = "winch"\na = 1\na = 2\n', 4, "TOML syntax"),
+        ('schema = 1\nkind = "winch"\na = """x', 3, "TOML syntax"),
+        ('kind = "winch"\n', 1, "write schema = 1"),
+        ('schema = 2\nkind = "winch"\n', 1, "2 is unknown"),
+        ('schema = true\nkind = "winch"\n', 1, "True is unknown"),
+        ("schema = 1\n", 1, "missing; use one of winch"),
+        ('schema = 1\nkind = "whinch"\n', 2, "did you mean 'winch'?"),
+        ("schema = 1\nkind = [1]\n", 2, "unknown kind [1]"),
+        (" \n# nothing\n", 1, "schema"),
+        ("", None, "empty"),
+    ],
+)
+def test_text_that_is_no_declaration(file: Path, text: str, line: int | None, part: str) -> None:
+    faults = faults_of(file, text)
+    assert faults[0][0] == line
+    assert part in faults[0][2]
+
+
+def test_nested_too_deep(file: Path) -> None:
+    depth = 100_000
+    faults = faults_of(file, "a = " + "[" * depth + "]" * depth)
+    assert "too deep" in faults[0][2]
+
+
+@pytest.mark.parametrize(
+    ("content", "part"),
+    [(b"\x89PNG\r\n\x1a\n\x00\x01", "binary"), (b'name = "\xe9"', "E9h is not UTF-8")],
+)
+def test_bytes_that_are_no_text(file: Path, content: bytes, part: str) -> None:
+    file.write_bytes(content)
+    with pytest.raises(FileError, match=part):
+        read_any(file)
+
+
+def test_no_file_a_directory_and_an_odd_name(tmp_path: Path) -> None:
+    for path, part in (
+        (tmp_path / "nowhere.toml", "no such file"),
+        (tmp_path, "directory"),
+        ("a\0b.toml", "not a usable file name"),
+    ):
+        with pytest.raises(FileError, match=part):
+            read_any(path)
+
+
+def test_a_mark_of_byte_order_and_carriage_returns_do_no_harm(file: Path) -> None:
+    file.write_bytes(b"\xef\xbb\xbf" + WINCH.replace("\n", "\r\n").encode())
+    assert load(file).kind == "winch"
+
+
+def test_another_kind_than_asked_for(file: Path) -> None:
+    file.write_text(WINCH)
+    with pytest.raises(FileError, match=r"file.toml:2: kind: is 'winch'; a 'bench' is needed here"):
+        read.read_bench(file)
+
+
+def test_a_guide_that_misses_its_groove_is_a_warning(file: Path) -> None:
+    grooved = WINCH.replace('"spiral"', '"grooved"').replace(
+        'layer_growth = "0.5 mm"', 'groove_pitch = "5 mm"'
+    )
+    guide = '[guide]\nscrew_lead = "2.5 mm"\nbelt_ratio = {}\n'
+    file.write_text(grooved + guide.format(2))
+    assert load(file).warnings == ()
+    file.write_text(grooved + guide.format(1.9))
+    (warning,) = load(file).warnings
+    assert (warning.line, warning.key) == (11, "guide")
+    assert "4.75 mm" in warning.message

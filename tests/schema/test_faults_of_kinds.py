@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import textwrap
+from math import radians
 from pathlib import Path
 
 import pytest
 
 from declared import BENCH, faults_of
+from winchkit.errors import FileError
+from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
+from winchkit.schema.read import load, read_bench, read_programme
+from winchkit.sim.live.bench_file import write_bench
 
 CASES: dict[str, tuple[str, list[tuple[int, str]]]] = {
     "programme": (
@@ -159,3 +164,114 @@ def test_a_device_is_of_one_kind(file: Path) -> None:
     assert [message for *_, message in faults] == [
         "a device has exactly one of the tables [servo], [modbus], [stream] and [process]"
     ]
+
+
+def move(to: float | None = None, by: float | None = None, winch: str = "all") -> ProgrammeStep:
+    return ProgrammeStep(to=to, by=by, speed=0.2, winch=winch)
+
+
+@pytest.mark.parametrize(
+    ("steps", "way"),
+    [
+        ([move(1.0), move(3.0)], (2.9, 3.0)),
+        ([move(3.0), move(2.95)], (3.0, 2.95)),
+        ([move(2.0), move(by=-0.5), ProgrammeStep(hold=1.0)], (1.6, 1.5)),
+        ([move(2.0), move(2.0)], (2.0,)),
+        ([move(by=-0.5), move(by=0.5)], ()),
+        ([move(by=-0.5), move(3.0)], (3.0,)),
+        ([move(1.0), move(4.0, winch="B")], (1.0,)),
+        ([ProgrammeStep(hold=1.0)], ()),
+    ],
+)
+def test_it_begins_where_it_ends_and_comes_from_the_same_side(
+    steps: list[ProgrammeStep], way: tuple[float, ...]
+) -> None:
+    assert Programme("p", tuple(steps)).approach("A") == pytest.approx(way)
+
+
+def test_a_question_is_asked_once_while_it_stays_true() -> None:
+    load = ProgrammeStep(ask="hang it", load_mass=10.0)
+    warm = ProgrammeStep(ask="warm it", temperature=35.0)
+    both = ProgrammeStep(ask="both", load_mass=10.0, temperature=35.0)
+    other = ProgrammeStep(ask="grease the drum")
+    assert load.asks_beyond(None, None)
+    assert not load.asks_beyond(10.0, None)
+    assert warm.asks_beyond(10.0, 20.0)
+    assert not warm.asks_beyond(None, 35.0)
+    assert both.asks_beyond(10.0, 20.0)
+    assert not both.asks_beyond(10.0, 35.0)
+    assert other.asks_beyond(10.0, 35.0)
+    assert not move(1.0).asks_beyond(None, None)
+
+
+def test_a_temperature_is_written_and_read_and_belongs_to_a_question(tmp_path: Path) -> None:
+    path = tmp_path / "warm.toml"
+    programme = Programme("warm", (ProgrammeStep(ask="warm it", temperature=35.0), move(1.0)))
+    write_programme(programme, path)
+    assert 'temperature = "35 degC"' in path.read_text(encoding="utf-8")
+    assert read_programme(path).step[0].temperature == 35.0
+    path.write_text(path.read_text(encoding="utf-8").replace("ask =", "hold = '1 s' #"))
+    with pytest.raises(FileError, match="belongs to a step with 'ask', not to 'hold'"):
+        read_programme(path)
+
+
+ROBOT = """\
+schema = 1
+kind = "bench"
+[robot]
+profile = "winding-device-8"
+speed = "0.2 m/s"
+rotation_speed = "20 deg/s"
+tension = ["60 N", "800 N"]
+tension_trim = "end"
+tracker = { listen = "udp://127.0.0.1:5100" }
+[bus.can]
+kind = "can"
+interface = "virtual"
+channel = "robot"
+"""
+WINCH = """\
+[winch.{name}]
+profile = "winding-device-winch"
+servo = {{ device = "generic-cia402", bus = "can", node = {name}, encoder = "absolute" }}
+limits = {{ speed = "0.5 m/s", tension_high = "900 N", tension_slack = "20 N" }}
+"""
+
+
+def write(path: Path, names: str = "12345678", **replaced: str) -> Path:
+    text = ROBOT + "".join(WINCH.format(name=name) for name in names)
+    for old, new in replaced.items():
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path
+
+
+def test_a_robot_is_read_in_si(tmp_path: Path) -> None:
+    spec = read_bench(write(tmp_path / "bench.toml"))
+    assert spec.robot.tracker is not None
+    assert spec.robot.tension == (60.0, 800.0)
+    assert spec.robot.rotation_speed == pytest.approx(radians(20))
+    assert spec.robot.lost_winch == "stop-together"
+    assert spec.robot.tension_trim == "end"
+    assert spec.robot.tracker.frame == "tracker"
+    again = load(write_bench(spec, tmp_path / "again.toml")).value
+    assert again == spec
+
+
+@pytest.mark.parametrize(
+    ("names", "replaced", "words"),
+    [
+        ("1234567", {}, "line 8 of robot 'winding-device-8' is no winch of this bench"),
+        ("12345678", {"800": "1000"}, "1000 N is above tension_high of winch 1, 900 N"),
+        ("12345678", {'"60 N"': '"10 N"'}, "10 N is below tension_slack of winch 1, 20 N"),
+        ("12345678", {'"60 N"': '"800 N"'}, "the lower limit 800 N is not below"),
+        ("12345678", {"udp:": "tcp:"}, "is no address such as"),
+        ("12345678", {":5100": ":x"}, "is no address such as"),
+        ("12345678", {"winding-device-8": "bench-spiral"}, "is 'winch'"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    tmp_path: Path, names: str, replaced: dict[str, str], words: str
+) -> None:
+    with pytest.raises(FileError, match=words):
+        read_bench(write(tmp_path / "bench.toml", names, **replaced))

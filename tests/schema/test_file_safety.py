@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
-from command_line import invoke
+from command_line import done, invoke
 from winchkit import catalog
 from winchkit.errors import Fault, one_line, printable
 from winchkit.runs import open_writer
@@ -263,8 +263,7 @@ def test_numbers_that_no_measurement_gives_are_faults_of_the_file(
         "compare": ("-p", PROFILE_FILE),
         "log replay": ("--fast", "--jsonl"),
     }
-    result = invoke(*command.split(), path, *more.get(command, ()))
-    assert result.exit_code == 3, result.stderr
+    result = done(*command.split(), path, *more.get(command, ()), code=3)
     assert part in result.stderr
     assert f"{path}:32: " in result.stderr
 

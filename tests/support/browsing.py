@@ -43,7 +43,6 @@ class Served:
         self.folder = folder
         command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
-        assert self.process.stdout is not None
         self.url = self.process.stdout.readline().strip()
         assert self.url.startswith("http://127.0.0.1:"), self.url
 

@@ -42,7 +42,6 @@ class Bridge:
         self._bus.shutdown()
 
     def _to_bus(self) -> None:
-        assert self._guest is not None
         with self._guest.makefile("r", encoding="ascii") as lines:
             while line := self._line(lines):
                 identifier, _, data = line.strip().partition("#")

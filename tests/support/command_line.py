@@ -1,7 +1,8 @@
-"""Command lines in the process of the test; every command with its words and examples."""
+"""Command lines in the process of the test or their own; every command with its examples."""
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,11 +18,22 @@ def invoke(*words: object, **options: Any) -> Result:
     return CliRunner().invoke(main, [*map(str, words)], **options)
 
 
-def done(*words: object, code: int = 0) -> Result:
-    """A command line that ends with a code."""
-    result = invoke(*words)
+def done(*words: object, code: int = 0, **options: Any) -> Result:
+    """A command line that ends with a code; ``options`` as of :func:`invoke`."""
+    result = invoke(*words, **options)
     assert result.exit_code == code, result.output
     return result
+
+
+def own_process(
+    *words: object, code: int | None = 0, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """A program in a process of its own, which ends with a code; None for any."""
+    ended: subprocess.CompletedProcess[str] = subprocess.run(
+        [*map(str, words)], capture_output=True, text=True, check=False, timeout=300, **options
+    )
+    assert code is None or ended.returncode == code, ended.stdout + ended.stderr
+    return ended
 
 
 def commands() -> Iterator[tuple[str, click.Command]]:

@@ -22,12 +22,13 @@ GAIN = 35.15065
 _EMPS = {"train.csv": "DATA_EMPS.mat", "test.csv": "DATA_EMPS_PULSES.mat"}
 
 
-def folder(variable: str, name: str) -> Path | None:
-    """Where the data are, if they are anywhere."""
+def folder(variable: str, name: str, *contents: str) -> Path | None:
+    """Where the data are, with all of these contents, if they are anywhere."""
     beside = [parent / "shared" / "data" / name for parent in Path(__file__).resolve().parents]
     named = os.environ.get(variable)
     places = [Path(named)] if named else beside
-    return next((place for place in places if place.is_dir()), None)
+    found = (p for p in places if p.is_dir() and all((p / one).exists() for one in contents))
+    return next(found, None)
 
 
 def emps_variables(path: Path) -> dict[str, NDArray[np.float64] | float]:

@@ -31,7 +31,6 @@ def start(
 
 def first_line(process: subprocess.Popen[str]) -> str:
     """What ``sim serve`` prints once its bench is served; without multicast the test is skipped."""
-    assert process.stdout is not None
     assert process.stderr is not None
     if line := process.stdout.readline():
         return line

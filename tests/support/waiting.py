@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 
 def until(
@@ -18,3 +19,12 @@ def until(
         assert time.monotonic() - begin < within, what
         time.sleep(every)
     return time.monotonic() - begin
+
+
+def run_together(threads: Iterable[Any]) -> None:
+    """Start threads, of Python or of a simulated clock, and wait until all have ended."""
+    started = [*threads]
+    for thread in started:
+        thread.start()
+    for thread in started:
+        thread.join()

@@ -10,20 +10,27 @@ from pathlib import Path
 
 import pytest
 
+from command_line import own_process
+
 ROOT = Path(__file__).parents[2]
 
 
 def run_pytest(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     """A session of its own, as a user starts one."""
     environment = {key: text for key, text in os.environ.items() if "PYTEST" not in key}
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "error", *options],
+    return own_process(
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-W",
+        "error",
+        *options,
+        code=None,
         cwd=folder,
         env=environment,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
     )
 
 

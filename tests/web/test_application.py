@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -14,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from command_line import own_process
 
 pytest.importorskip("starlette")
 pytest.importorskip("httpx2")
@@ -106,9 +107,7 @@ def test_a_socket_without_the_token_or_from_elsewhere_is_closed(client: TestClie
 
 def test_the_server_starts_without_the_statistics_of_a_fleet() -> None:
     code = "import sys; import winchkit.web.application; print('scipy.stats' in sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
-    )
+    done = own_process(sys.executable, "-c", code)
     assert done.stdout == "False\n"
 
 

@@ -39,12 +39,10 @@ from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import write_programme
 from winchkit.schema.read import read_profile
-from winchkit.web.candidate import candidate_card
+from winchkit.web.candidate import candidate_card, pattern, refit
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import ExampleRuns, example_runs, mystery_runs
 from winchkit.web.foreign import import_command, imported
-from winchkit.web.pattern import pattern
-from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, PageState, Version
 from winchkit.web.words import INTERNAL, free_path, page_text
 

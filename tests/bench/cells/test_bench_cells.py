@@ -117,7 +117,6 @@ def test_tares_are_restored_to_what_they_were_before(bench: Bench, wiring: Path)
 
 def test_an_unknown_task_is_refused(bench: Bench) -> None:
     station = attach(bench.spec)
-    assert station is not None
     try:
         with pytest.raises(UsageError, match="no task 'melt'"):
             station.cell("melt", "A")

@@ -1,4 +1,4 @@
-"""A bench file of load cells only: no profile, no drive, no limits."""
+"""Load cells without drives: a bench file of them alone, and ``winchkit cell`` as Python calls."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+import winchkit
 from command_line import done
 from served import Served
-from winchkit.errors import FileError, UsageError
+from winchkit.errors import FileError, NotPermitted, UsageError
 from winchkit.runs import read_run
 from winchkit.schema.read import read_bench, read_tares
 
@@ -96,3 +97,48 @@ def test_half_a_winch_is_a_fault_with_its_line(tmp_path: Path, winches: str, sai
 def test_a_bench_of_cells_has_no_winch_to_name(bench: Path) -> None:
     with pytest.raises(UsageError, match="only the instruments of A"):
         read_bench(bench).winch_named("A")
+
+
+def test_information_and_rate(cell: Served, tmp_path: Path) -> None:
+    bench = cell.bench(tmp_path, ', rate = "40 Hz"')
+    facts = winchkit.cell_info(bench)
+    assert facts.identity["serial number"] == 4711
+    assert facts.reading.value == pytest.approx(100.0, abs=3)
+    report = winchkit.cell_rate(bench, "A", duration=0.5)
+    assert report.limits["`rate` in the wiring"] == 40.0
+    assert report.rate < 50.0
+    with pytest.raises(UsageError, match=r"the bench has A\.cell"):
+        winchkit.cell_info(bench, "B")
+
+
+def test_tares_of_host_and_device_are_set_and_removed(cell: Served, tmp_path: Path) -> None:
+    cell.noise = 0.02
+    bench = cell.bench(tmp_path)
+    host = winchkit.cell_tare(bench, duration=0.2)
+    assert host.tare == pytest.approx(100.0, abs=0.1)
+    assert winchkit.cell_info(bench).reading.value == pytest.approx(0.0, abs=0.2)
+    assert winchkit.cell_tare(bench, clear=True).removed == pytest.approx(100.0, abs=0.1)
+    cell.force = 160.0
+    result = winchkit.cell_tare(bench, duration=0.2, device=True)
+    assert result.before == pytest.approx(160.0, abs=0.2)
+    assert winchkit.cell_info(bench).tare.device is True
+    winchkit.cell_tare(bench, duration=0.2, device=True, clear=True)
+    assert winchkit.cell_info(bench).tare.device is False
+    assert cell.cell.stored == 0, "no tare writes the EEPROM"
+
+
+def test_zero_and_store(cell: Served, tmp_path: Path) -> None:
+    cell.noise = 0.02
+    bench = cell.bench(tmp_path)
+    assert winchkit.cell_zero(bench, duration=0.2).after == pytest.approx(0.0, abs=0.5)
+    with pytest.raises(NotPermitted):
+        winchkit.cell_store(bench, "tare")
+    assert cell.cell.stored == 0
+    winchkit.cell_store(bench, "store")
+    assert cell.cell.stored == 1
+
+
+def test_health_measures_the_noise_that_is_there(cell: Served, tmp_path: Path) -> None:
+    cell.noise = 0.5
+    health = winchkit.cell_health(cell.bench(tmp_path), duration=1.0)
+    assert health.noise == pytest.approx(0.5, rel=0.4)

@@ -73,7 +73,6 @@ def test_motion_waits_for_the_record_and_ends_with_a_changed_drive(
         with bench.open() as opened:
             assert opened.axes["A"].stops_on_nmt
             drive = opened.axes["A"].drive
-            assert drive is not None
             assert drive.host_loss.words.startswith("seen to stop")
             opened.winch["A"].move_by(pay_out=0.01)
     with (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import subprocess
 import sys
 import textwrap
 import threading
@@ -14,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from command_line import own_process
 from winchkit import catalog, open_bench
 from winchkit.bench.control.computer import _limit, survey
 from winchkit.bench.control.realtime import RestCollector, acquire
@@ -188,7 +188,7 @@ def test_a_refusal_names_the_setting_that_permits_it_and_changes_nothing() -> No
     import json
 
     script = textwrap.dedent(_WITHOUT_PERMISSION)
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    run = own_process(sys.executable, "-c", script)
     refused, policy, demanded, undone, surveyed = json.loads(run.stdout)
     assert set(refused) == {"scheduling", "memory"}
     assert "rtprio 50" in refused["scheduling"]

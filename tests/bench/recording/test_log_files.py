@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from fed import BENCHMARKS, SUPPORT, Fed, SetClock, recording
+from waiting import run_together
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.errors import FileError, UsageError
 from winchkit.runs import open_writer, read_run, write_run
@@ -204,15 +205,12 @@ def test_of_processes_that_begin_at_once_exactly_one_logs(tmp_path: Path, suffix
         for number in range(6)
     ]
     for process in processes:
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
     for process in processes:
-        assert process.stdin is not None
         process.stdin.write("\n")
         process.stdin.flush()
     said = []
     for process in processes:
-        assert process.stdout is not None
         said.append(process.stdout.readline().split()[0])
     assert sorted(said) == ["logs", *["refused"] * 5], said
     for process in processes:
@@ -236,10 +234,7 @@ def test_of_threads_that_begin_at_once_exactly_one_logs(tmp_path: Path) -> None:
             refused.append(error)
 
     threads = [threading.Thread(target=begin) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert (len(began), len(refused)) == (1, 3)
     began[0].close()
 
@@ -254,7 +249,6 @@ def test_the_lock_dies_with_the_process(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         text=True,
     ) as process:
-        assert process.stdin is not None
         assert process.stdout is not None
         process.stdin.write("\n")
         process.stdin.flush()
@@ -280,7 +274,6 @@ def test_the_lock_is_one_that_other_programs_see(tmp_path: Path) -> None:
         stdout=subprocess.PIPE,
         text=True,
     )
-    assert held.stdout is not None
     assert held.stdout.readline() == "held\n"
     with pytest.raises(UsageError, match="another log is being written to it"):
         started(path, replace=True)

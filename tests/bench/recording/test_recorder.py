@@ -5,16 +5,18 @@ from __future__ import annotations
 import csv
 import logging
 import os
+import random
 import re
 import resource
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from command_line import own_process
 from fed import BENCHMARKS, CYCLE, DELAY, SUPPORT, Fed, SetClock, angle, give, recording, tension
+from recorder_kill import kill_once
 from small_disk import run_on_small_disk
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.recording.recorder import Recorder
@@ -247,15 +249,7 @@ def test_a_disk_that_fills_ends_the_log_and_nothing_else(tmp_path: Path, suffix:
     path = tmp_path / f"a.{suffix}"
     limit = "resource.setrlimit(resource.RLIMIT_FSIZE, (150_000, 150_000))"
     script = FILLING.format(tests=SUPPORT, path=repr(str(path)), limit=limit)
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        env=os.environ | {"PYTHONPATH": BENCHMARKS},
-    )
-    assert done.returncode == 0, done.stderr
+    done = own_process(sys.executable, "-c", script, env=os.environ | {"PYTHONPATH": BENCHMARKS})
     assert f"told {path}: cannot be written: File too large" in done.stdout
     assert "listeners 0" in done.stdout
     assert re.search("the loop goes on [01]$", done.stdout, re.MULTILINE), "nothing piles up"
@@ -321,3 +315,29 @@ def test_what_is_not_taken_is_counted(tmp_path: Path, monkeypatch: pytest.Monkey
     log = read_log(tmp_path / "a.mcap")
     lost = recorder.counters()["log"]["drops"]
     assert len(log.samples["/A/drive"]) == pytest.approx(fed.cycle - lost, abs=3)
+
+
+MOMENTS = random.Random(7)
+LOSS = {"mcap": 0.3, "csv": 0.3}
+"""s"""
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is POSIX")
+@pytest.mark.parametrize(
+    ("moment", "rotate", "suffix"),
+    [
+        (MOMENTS.uniform(0, 1.5), rotate, suffix)
+        for suffix in ("mcap", "csv")
+        for rotate in (None, "1s", None, "10kB", None)
+    ],
+)
+def test_a_killed_recording_loses_little_and_is_recovered(
+    tmp_path: Path, moment: float, rotate: str | None, suffix: str
+) -> None:
+    """Whole to the last flush, as the package ``mcap`` and Python's own csv reader find it."""
+    killed = kill_once(tmp_path, moment, rotate, suffix)
+    assert killed.lost <= LOSS[suffix]
+    assert killed.gaps == 0
+    assert killed.whole
+    assert killed.recovered

@@ -135,10 +135,8 @@ def test_the_command_reports_it_at_once_and_at_the_end(
     words = ("log", "-b", "bench.toml", "-o", path, "--for", "4s", *strict)
     with start(*words, folder=tmp_path) as log:
         until(lambda: path.is_file() and len(path.read_text().split("\n")) >= 60, 30.0)
-        assert served.stdin is not None
         served.stdin.write("fault A.cell silence\n")
         served.stdin.flush()
-        assert log.stderr is not None
         first = log.stderr.readline()
         assert log.poll() is None, "it is reported while the log goes on"
         assert "A.cell: no sample for" in first

@@ -39,7 +39,6 @@ ORDERS: dict[str, Callable[[Station, str], None]] = {
 def at(kind: str, bench: Bench) -> Iterator[LocalStation | RemoteStation]:
     """A station of the owner's process, or one at its socket; the winch is at rest at the end."""
     station = LocalStation(bench) if kind == "local" else attach(bench.spec)
-    assert station is not None
     try:
         yield station
     finally:

@@ -23,6 +23,7 @@ import pytest
 
 from client_stalls import served as stalls_served
 from client_stalls import stall
+from command_line import own_process
 from sim_process import WINCHKIT, served_bench, start
 from waiting import until
 from winchkit import attach, open_bench
@@ -39,14 +40,7 @@ pytestmark = [
 
 
 def winchkit(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*WINCHKIT, *arguments],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    return own_process(*WINCHKIT, *arguments, code=None, stdin=subprocess.DEVNULL)
 
 
 def relaxed(text: str) -> str:
@@ -69,7 +63,6 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def state(served: Path) -> tuple[float, str]:
     """True cable length, m, and the drive's state, by the simulation."""
     found = re.match(r"A: ([\d.]+) m, .* kg, ([a-z ]+)", send(served, "status"))
-    assert found is not None
     return float(found[1]), found[2]
 
 
@@ -162,7 +155,6 @@ def test_jog_moves_and_says_where_it_is(served: Path) -> None:
     after, _ = state(served)
     assert 0.05 < after - before < 0.12
     shown = re.match(r"A: ([\d.]+) m", done.stdout)
-    assert shown is not None
     assert float(shown[1]) == pytest.approx(after, abs=5e-3)
     back = winchkit("jog", "-b", str(served), "--wind-in", "50mm", "--speed", "0.1m/s")
     assert back.returncode == 0, back.stderr

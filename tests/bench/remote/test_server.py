@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from command_line import own_process
 from slave.power import State
 from slave.rig import Rig
 from winchkit.bench.bench import Bench
@@ -157,8 +157,6 @@ def test_what_fails_in_a_bench_process_before_it_is_open_is_a_defect_of_it_too()
         "import sys; from winchkit.schema import read; read.read_bench = lambda _: 1 / 0; "
         "from winchkit.bench.remote import process; sys.argv = ['', 'bench.toml']; process.main()"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
-    )
+    done = own_process(sys.executable, "-c", code, code=None)
     assert json.loads(done.stdout) == {"defect": "ZeroDivisionError: division by zero"}
     assert "Traceback" in done.stderr, "its log has the place"

@@ -7,10 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from slave import Slave
 from slave.held_key import HeldKey
 from slave.rig import Rig, bench_text
-from slave.wire import GENERIC
 from slave_bench import served, write_bench
 from winchkit.bench.bench import Bench
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
@@ -24,8 +22,7 @@ def _first_trip(rig: Rig, bench: Bench) -> str:
 
 
 @pytest.mark.parametrize("factor", [-1.0, -0.5])
-def test_a_reversed_motor_is_called_one(tmp_path: Path, factor: float) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_reversed_motor_is_called_one(rig: Rig, factor: float) -> None:
     with rig.opened() as bench:
         rig.slaves[0].inject("follows wrongly", factor)
         said = _first_trip(rig, bench)
@@ -53,8 +50,7 @@ def test_a_motion_that_is_missing_is_called_what_it_is(
         assert said in str(bench.snapshot.tripped[0])
 
 
-def test_a_drive_that_keeps_its_speed_is_not_called_reversed(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_drive_that_keeps_its_speed_is_not_called_reversed(rig: Rig) -> None:
     with rig.opened() as bench:
         key = HeldKey(rig, bench).press()
         rig.wait(1.0)
@@ -83,8 +79,7 @@ def test_what_is_missing_of_a_drive_is_what_supervises_it(
     assert not_said not in found
 
 
-def test_two_nodes_with_one_number_do_not_open(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_two_nodes_with_one_number_do_not_open(rig: Rig) -> None:
     rig.wait(0.3)
     slave = rig.slaves[0]
     slave.inject("two nodes with one number")
@@ -96,20 +91,17 @@ def test_two_nodes_with_one_number_do_not_open(tmp_path: Path) -> None:
         bench.winch["A"].move_by(pay_out=0.01)
 
 
-def test_two_nodes_of_which_one_is_slow_are_no_missing_answer(tmp_path: Path) -> None:
+def test_two_nodes_of_which_one_is_slow_are_no_missing_answer(rig: Rig) -> None:
     """The second answer comes after the next request: the client takes it for that request's."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     rig.wait(0.3)
     slave = rig.slaves[0]
     slave.inject("two nodes with one number")
-    assert slave.twin is not None
     slave.twin.inject("sdo delayed", 0.003)
     with pytest.raises(DeviceRefused, match="two nodes have this number"):
         rig.open()
 
 
-def test_a_dead_drive_is_no_second_node(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_dead_drive_is_no_second_node(rig: Rig) -> None:
     rig.slaves[0].inject("sdo unheard")
     with pytest.raises(NoReply, match="check power, wiring, bit rate and node id"):
         rig.open()
@@ -142,9 +134,8 @@ def test_a_mode_that_the_drive_itself_lacks(tmp_path: Path) -> None:
 
 
 def test_a_slow_opening_says_what_it_waits_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    rig: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     rig.wait(0.3)
     rig.slaves[0].inject("sdo delayed", 0.3)
     begun = rig.time
@@ -160,9 +151,8 @@ def test_a_slow_opening_says_what_it_waits_for(
 
 
 def test_an_answer_that_is_too_late_is_called_late_and_the_file_says_how_long(
-    tmp_path: Path,
+    rig: Rig,
 ) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     rig.wait(0.3)
     rig.slaves[0].inject("sdo delayed", 0.7)
     text = bench_text(rig.channel)
@@ -177,10 +167,34 @@ def test_an_answer_that_is_too_late_is_called_late_and_the_file_says_how_long(
         bench.winch["A"].move_by(pay_out=0.01)
 
 
-def test_a_drive_that_has_not_answered_yet_may_be_slow(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_drive_that_has_not_answered_yet_may_be_slow(rig: Rig) -> None:
     rig.wait(0.3)
     rig.slaves[0].inject("sdo delayed", 30.0)
     words = r"check power, .*, and for a slow drive set sdo_timeout in \[bus\.can\]"
     with pytest.raises(NoReply, match=rf"no answer within 0\.5 s; {words}"):
         rig.open()
+
+
+STRAYS = {
+    "write of 6040h": "6040600000000000",
+    "write of the same object": "607C600000000000",
+    "read of 6041h": "4B41600037060000",
+    "abort of 6040h": "8040600022000008",
+}
+
+
+@pytest.mark.parametrize("stray", STRAYS)
+@pytest.mark.parametrize("after", [0.005, 0.02])
+def test_a_transfer_takes_its_own_reply_only(rig: Rig, stray: str, after: float) -> None:
+    with rig.opened() as bench:
+        node = bench.axes["A"].objects
+        node.write(0x607C, 0, 4711)
+        rig.slaves[0].inject("sdo delayed", 0.03)
+        frame = bytes.fromhex(STRAYS[stray])
+        rig.clock.call_at(rig.time + after, lambda: rig.from_stranger(0x581, frame))
+        assert node.read(0x607C) == 4711
+        rig.clock.call_at(rig.time + after, lambda: rig.from_stranger(0x581, frame))
+        if stray != "write of the same object":  # which is its own
+            node.write(0x607C, 0, 12)
+            assert node.read(0x607C) == 12
+        assert not bench.snapshot.tripped

@@ -6,6 +6,7 @@ that its trip (or its warning) is dropped.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,14 +14,17 @@ from typing import Any
 
 import pytest
 
-from slave.held_key import jogging, observe
-from slave.rig import Rig
+from slave import State
+from slave.held_key import HeldKey, jogging, observe, since
+from slave.rig import Rig, bench_text
+from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.conditions import BENCH_CONDITIONS
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.supervisor import Supervisor
-from winchkit.errors import LimitTripped, NotPermitted
+from winchkit.bench.winch import Winch
+from winchkit.errors import LimitTripped, MotionError, NotPermitted
 
 _WITHIN = 0.15
 """s."""
@@ -181,3 +185,87 @@ def test_a_trip_is_kept_although_the_latch_file_was_changed(rig: Rig, change: st
     rig.wait(0.5)
     with rig.opened() as again, pytest.raises(LimitTripped):
         again.winch["A"].move_by(pay_out=0.02)
+
+
+_MOTIONS: dict[str, Callable[[Winch], None]] = {
+    "jog by 0.3 m at a sixth of the limit": lambda w: w.jog(pay_out=0.05, duration=6.0),
+    "jog by 10 mm": lambda w: w.jog(wind_in=0.02, duration=0.5),
+    "move by 5 mm": lambda w: w.move_by(wind_in=0.005, speed=0.01),
+}
+
+
+@pytest.mark.parametrize("motion", _MOTIONS)
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_motion_that_is_not_made_is_an_error(rig: Rig, motion: str, share: float) -> None:
+    """``share`` of what is commanded is what the motor does."""
+    with rig.opened() as bench:
+        rig.wait(0.3)
+        rig.slaves[0].inject("follows wrongly", share)
+        if share and "move" in motion:
+            _MOTIONS[motion](bench.winch["A"])  # the position loop makes up for it
+            return
+        long = "0.3 m" in motion
+        with pytest.raises(MotionError, match=r"was commanded to .* and moved 0\.0"):
+            _MOTIONS[motion](bench.winch["A"])
+        rig.wait(0.05)
+        assert [trip.kind for trip in bench.snapshot.tripped] == ["missing motion"] * long
+        assert [warning.kind for warning in bench.snapshot.warnings] == ["motion"] * (not long)
+        rig.slaves[0].mend_all()
+        rig.wait(0.5)
+        bench.reset()
+        _MOTIONS[motion](bench.winch["A"])
+        assert not bench.snapshot.tripped
+
+
+def test_an_encoder_that_stands_still_with_the_speed_derived_from_it_is_seen_after_20_mm(
+    rig: Rig,
+) -> None:
+    """The motor turns as commanded, 6064h and 606Ch stand still: the lag is all that shows."""
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        rig.wait(0.3)
+        slave.inject("position stuck")
+        slave.inject("velocity stuck")
+        angle = slave.motor.angle
+        with pytest.raises(LimitTripped, match=r"was commanded to pay out .* and moved 0\.000 m"):
+            bench.winch["A"].jog(pay_out=0.05, duration=10.0)
+        assert abs((slave.motor.angle - angle) * bench.winch["A"].cable.arm(0.0)) < 0.06
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["CSV", "CSP", "PV"])
+@pytest.mark.parametrize("pay_out", [0.2, -0.2])
+def test_a_jog_in_every_mode_ends_at_the_length_limit(
+    tmp_path: Path, mode: str, pay_out: float
+) -> None:
+    """It is slowed down before the limit; the way back is free."""
+    device = tmp_path / mode
+    shutil.copytree(GENERIC.parent, device)
+    file = device / "device.toml"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(
+        text.replace('motion_mode = "CSV"', f'motion_mode = "{mode}"'), encoding="utf-8"
+    )
+    rig = Rig(tmp_path)
+    bench_file = bench_text(rig.channel, device=str(file)) + 'length = ["3.8 m", "4.2 m"]\n'
+    with rig.opened(bench_file) as bench:
+        winch = bench.winch["A"]
+        assert winch.cable_length == pytest.approx(4.0, abs=0.01)
+        key = HeldKey(rig, bench, pay_out=pay_out).press()
+        rig.wait(3.0)
+        key.release()
+        rig.wait(0.5)
+        assert key.errors == []
+        assert not bench.snapshot.tripped
+        left = 0.2 - abs(winch.cable_length - 4.0)
+        assert 0.0 <= left < 0.005, "at rest just before the limit, m"
+        assert rig.slaves[0].power.state is not State.ENABLED
+        again = HeldKey(rig, bench, pay_out=pay_out).press()
+        rig.wait(1.0)
+        again.release()
+        rig.wait(0.5)
+        assert abs(winch.cable_length - 4.0) <= 0.2, "held again, it goes no further"
+        start = rig.time
+        winch.jog(**{"wind_in" if pay_out > 0 else "pay_out": 0.1}, duration=0.5)
+        assert since(rig, start).moved
+        assert abs(winch.cable_length - 4.0) < 0.17

@@ -6,14 +6,11 @@ another master can enable it. The state of the drive is the slave's own, at ever
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from slave import Slave, State
+from slave import State
 from slave.held_key import jogging
 from slave.rig import Rig
-from slave.wire import GENERIC
 
 _FIRST_STOP = 0.15
 """The longest that a drive may be enabled without a command, s."""
@@ -39,9 +36,8 @@ def longest_enabled(rig: Rig, begin: float) -> float:
 @pytest.mark.parametrize("enabled_by", ["second master enables", "enables itself"])
 @pytest.mark.parametrize("unseen", [*_PRE_OPERATIONAL, "tpdo lost"])
 def test_a_drive_at_rest_that_answers_no_sync(
-    tmp_path: Path, unseen: str, enabled_by: str, delay: float
+    rig: Rig, unseen: str, enabled_by: str, delay: float
 ) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         rig.wait(0.2)
         rig.slaves[0].inject(unseen)
@@ -60,8 +56,7 @@ def test_a_drive_at_rest_that_answers_no_sync(
 
 
 @pytest.mark.parametrize("unseen", _PRE_OPERATIONAL)
-def test_a_drive_that_went_pre_operational_in_motion(tmp_path: Path, unseen: str) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_drive_that_went_pre_operational_in_motion(rig: Rig, unseen: str) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         rig.slaves[0].inject(unseen)
@@ -82,9 +77,8 @@ def requests_from_here(rig: Rig, begin: float, others: list[bytes]) -> list[byte
     return found
 
 
-def test_a_transfer_of_somebody_else_is_not_disturbed(tmp_path: Path) -> None:
+def test_a_transfer_of_somebody_else_is_not_disturbed(rig: Rig) -> None:
     """A maker's tool writes a firmware to a pre-operational drive, beside an open bench."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened():
         rig.wait(0.2)
         rig.slaves[0].inject("pre-operational by a stranger")
@@ -103,8 +97,7 @@ def test_a_transfer_of_somebody_else_is_not_disturbed(tmp_path: Path) -> None:
         assert len(requests_from_here(rig, begin, sent)) > begun, "the state is read again"
 
 
-def test_a_control_word_within_a_transfer_is_answered_by_a_quick_stop(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_control_word_within_a_transfer_is_answered_by_a_quick_stop(rig: Rig) -> None:
     with rig.opened():
         rig.wait(0.2)
         rig.slaves[0].inject("pre-operational by a stranger")
@@ -119,8 +112,7 @@ def test_a_control_word_within_a_transfer_is_answered_by_a_quick_stop(tmp_path: 
         assert 0.0 < longest_enabled(rig, begin) < 0.02
 
 
-def test_a_drive_that_answers_is_asked_nothing_by_sdo(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_drive_that_answers_is_asked_nothing_by_sdo(rig: Rig) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         begin = rig.time

@@ -18,11 +18,10 @@ from typing import Any
 
 import pytest
 
-from slave import Slave, State
+from slave import State
 from slave.cell import Cell
 from slave.held_key import HeldKey, jogging, observe, since
 from slave.rig import Rig, bench_text
-from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Trip
 from winchkit.errors import LimitTripped, MotionError, NoReply, NotPermitted
@@ -95,8 +94,7 @@ _QUICK = ("enable input open", "stopped by a stranger", "drive fault", "host fra
         for row in _ROWS
     ],
 )
-def test_a_fault_under_a_held_key(tmp_path: Path, row: Row) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_fault_under_a_held_key(rig: Rig, row: Row) -> None:
     slave = rig.slaves[0]
     with rig.opened() as bench:
         key = jogging(rig, bench)
@@ -382,7 +380,6 @@ def _unsigned_target(bench: Bench) -> None:
         raise OverflowError("can't convert negative int to unsigned")
 
     commander = bench.axes["A"]._commander
-    assert commander is not None
     commander.frames = encode  # type: ignore[method-assign, assignment]
 
 

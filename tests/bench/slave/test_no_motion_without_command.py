@@ -193,7 +193,6 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
     @rule(change=st.sampled_from([0.05, -0.05]))
     def move(self, change: float) -> None:
         def begin() -> None:
-            assert self.bench is not None
             winch = self.bench.winch["A"]
             if change > 0:
                 winch.move_by(pay_out=change, wait=False)
@@ -205,7 +204,6 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
     @precondition(lambda self: self.bench is not None)
     @rule(what=st.sampled_from(["home", "tare", "stop", "stop now"]))
     def call(self, what: str) -> None:
-        assert self.bench is not None
         winch = self.bench.winch["A"]
         if what == "stop now":
             self.ended = self.rig.time
@@ -326,7 +324,6 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
         self.tripped = tripped
 
     def _commands(self, call: Callable[[], None], lasts: float) -> None:
-        assert self.bench is not None
         tripped = bool(self.bench.snapshot.tripped) or self.rig.time > self.must
         try:
             call()

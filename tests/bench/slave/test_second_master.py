@@ -65,9 +65,8 @@ HARMLESS: dict[str, Frame] = {
 }
 
 
-def test_a_word_that_the_next_rpdo_takes_back_is_a_trip(tmp_path: Path) -> None:
+def test_a_word_that_the_next_rpdo_takes_back_is_a_trip(rig: Rig) -> None:
     """The status word says operation enabled before and after: no cycle shows anything else."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         key = jogging(rig, bench)
         start = rig.time
@@ -81,10 +80,9 @@ def test_a_word_that_the_next_rpdo_takes_back_is_a_trip(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("word", "named"), [(0x02, True), (0x06, False)])
 def test_a_quick_stop_of_somebody_else_may_be_a_winchkit_stop(
-    tmp_path: Path, word: int, named: bool
+    rig: Rig, word: int, named: bool
 ) -> None:
     """One that found no owner yet, while the bench was being opened."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         rig.from_stranger(*write(0x6040, word, 2))
         rig.until(lambda: bool(bench.snapshot.tripped), within=1.0)
@@ -93,8 +91,7 @@ def test_a_quick_stop_of_somebody_else_may_be_a_winchkit_stop(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_command_of_somebody_else_is_a_latched_trip(tmp_path: Path, name: str) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_command_of_somebody_else_is_a_latched_trip(rig: Rig, name: str) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         start = rig.time
@@ -116,8 +113,7 @@ def test_a_command_of_somebody_else_is_a_latched_trip(tmp_path: Path, name: str)
     assert seen.left <= _WITHIN
 
 
-def test_who_reads_or_speaks_to_others_is_let_be(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_who_reads_or_speaks_to_others_is_let_be(rig: Rig) -> None:
     with rig.opened() as bench:
         key = jogging(rig, bench)
         for name, frame in HARMLESS.items():
@@ -132,8 +128,7 @@ def test_who_reads_or_speaks_to_others_is_let_be(tmp_path: Path) -> None:
         rig.wait(0.5)
 
 
-def test_at_rest_it_is_a_trip_too_and_the_reset_sets_the_drive_up_anew(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_at_rest_it_is_a_trip_too_and_the_reset_sets_the_drive_up_anew(rig: Rig) -> None:
     objects = rig.slaves[0].objects
     with rig.opened() as bench:
         rig.wait(0.3)
@@ -169,8 +164,7 @@ def test_an_rpdo_that_cannot_be_switched_off_is_listened_to(tmp_path: Path) -> N
     assert seen.left <= _WITHIN
 
 
-def test_a_master_that_goes_on_keeps_a_reset_from_succeeding(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_master_that_goes_on_keeps_a_reset_from_succeeding(rig: Rig) -> None:
     goes_on = True
 
     def send() -> None:
@@ -200,8 +194,7 @@ def test_frames_of_two_benches_on_one_bus_are_those_of_their_own_drives(tmp_path
         assert (trip.kind, trip.winch) == ("second master", "B")
 
 
-def test_a_heartbeat_with_an_unknown_state_is_a_trip_and_ends_no_loop(tmp_path: Path) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_heartbeat_with_an_unknown_state_is_a_trip_and_ends_no_loop(rig: Rig) -> None:
     with rig.opened() as bench:
         rig.wait(0.3)
         rig.from_stranger(0x701, b"\x06")

@@ -12,12 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from slave import Slave, State
+from slave import State
 from slave.frames import Frame
 from slave.held_key import jogging, observe
 from slave.oracle import ESCALATED
 from slave.rig import Rig
-from slave.wire import GENERIC
 from winchkit.bench.control import stop_escalation
 from winchkit.bench.control.stop_escalation import STOP_TABLE, StopMethod
 from winchkit.errors import MotionError, WinchkitError
@@ -123,9 +122,8 @@ def test_every_rung_has_a_case() -> None:
     assert {case.method for case in CASES} == {row.method for row in STOP_TABLE} == set(StopMethod)
 
 
-def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> None:
+def test_a_reset_during_a_motion_withholds_no_way_to_stop(rig: Rig) -> None:
     """Only silence stops a drive that follows no control word, also while a reset waits."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     slave = rig.slaves[0]
     with rig.opened() as bench:
         jogging(rig, bench)
@@ -143,8 +141,7 @@ def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("motion", ["move", "jog"])
-def test_a_reset_ends_a_motion_by_a_ramp_and_says_so(tmp_path: Path, motion: str) -> None:
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+def test_a_reset_ends_a_motion_by_a_ramp_and_says_so(rig: Rig, motion: str) -> None:
     with rig.opened() as bench:
         winch = bench.winch["A"]
         if motion == "jog":
@@ -164,9 +161,8 @@ def test_a_reset_ends_a_motion_by_a_ramp_and_says_so(tmp_path: Path, motion: str
         assert winch.cable_length == pytest.approx(rest, abs=1e-4)
 
 
-def test_a_stop_in_any_cycle_of_enabling_is_no_trip(tmp_path: Path) -> None:
+def test_a_stop_in_any_cycle_of_enabling_is_no_trip(rig: Rig) -> None:
     """In one of them the drive is enabled and has not shown it yet: it "left" that state."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         winch = bench.winch["A"]
         for number in range(12):
@@ -178,10 +174,9 @@ def test_a_stop_in_any_cycle_of_enabling_is_no_trip(tmp_path: Path) -> None:
 
 
 def test_targets_that_come_again_after_a_loss_move_no_faster_than_a_fifth_of_the_limit(
-    tmp_path: Path,
+    rig: Rig,
 ) -> None:
     """The lag of a second was made up at limits.speed, which then tripped as a runaway."""
-    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:
         winch, speeds = bench.winch["A"], list[float]()
         limits = winch.wiring.limits

@@ -97,7 +97,6 @@ def test_a_tone_at_half_the_rate_is_not_made_up() -> None:
 def test_creep_after_a_load_is_reported_for_thirty_minutes() -> None:
     """Of 200 N 0.4 N a unit of ln t: from 1 to 30 minutes 0.4 ln 30."""
     health = examine(made(seconds=40.0, noise=0.05, step=200.0, creep=0.4))
-    assert health.creep is not None
     assert health.creep.step == pytest.approx(200.0, rel=0.01)
     assert health.creep.change == pytest.approx(0.4 * math.log(30), abs=4 * health.creep.std)
     assert "creeps" in remarks(health)
@@ -105,7 +104,6 @@ def test_creep_after_a_load_is_reported_for_thirty_minutes() -> None:
 
 def test_a_change_of_load_without_creep_is_not_called_creep() -> None:
     health = examine(made(seconds=20.0, step=200.0))
-    assert health.creep is not None
     assert abs(health.creep.change) < 4 * health.creep.std
     assert "creeps" not in remarks(health)
 

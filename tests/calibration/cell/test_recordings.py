@@ -167,7 +167,6 @@ def test_figures_are_of_the_longest_stretch_and_creep_of_the_largest_change(path
     value[3000:] += 100 * np.log(since[3000:] / 0.5)
     found = findings(path, time, np.round(value))
     creep = found.health.creep
-    assert creep is not None
     assert creep.step == pytest.approx(20_000, rel=0.05)
     assert creep.change == pytest.approx(100 * np.log(30), abs=4 * creep.std)
     assert found.health.low > 60_000

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from can_commands import Served, length, served, without_trip
-from command_line import invoke
+from command_line import done, invoke
 from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Phase
@@ -41,16 +41,13 @@ def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
         assert [item.winch for item in station.scan()] == ["A", "B"]
         assert {item.heartbeat for item in station.scan()} == {"operational"}
         told = station.upload("A", 0x6007, 0)
-        assert told is not None
         assert told[0] == bench.number(0x6007)
         assert station.upload("A", 0x5FFF, 0) is None
         # The other commands of this process go through the owner as well.
         assert "mode CSV" in invoke("info", "A", "-b", bench.file).stdout
-        refused = invoke("config", "store", "A", "-b", bench.file, "--yes")
-        assert refused.exit_code == 5
+        refused = done("config", "store", "A", "-b", bench.file, "--yes", code=5)
         assert "is owned by another process" in refused.stderr
-        lss = invoke("lss", "list", "-b", bench.file)
-        assert lss.exit_code == 5
+        done("lss", "list", "-b", bench.file, code=5)
 
 
 def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
@@ -73,7 +70,6 @@ def test_whoever_goes_away_during_a_homing_stops_it(bench: Served) -> None:
 def owned(bench: Bench) -> Iterator[RemoteStation]:
     """A station as another process would have it."""
     station = attach(bench.spec)
-    assert station is not None
     try:
         yield station
     finally:

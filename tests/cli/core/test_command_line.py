@@ -19,7 +19,7 @@ import pytest
 from click.testing import Result
 
 import winchkit
-from command_line import invoke
+from command_line import done, invoke, own_process
 from winchkit.cli import main
 from winchkit.cli.core.output import to_json
 from winchkit.errors import (
@@ -38,14 +38,7 @@ HEAVY = {"numpy", "scipy", "canopen", "can", "pymodbus", "pydantic", "rich", "mc
 
 
 def python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-        env=os.environ | environment,
-    )
+    return own_process(sys.executable, "-c", code, code=None, env=os.environ | environment)
 
 
 def running(
@@ -78,8 +71,7 @@ def test_start_up_imports_nothing_heavy(code: str) -> None:
 
 
 def test_help_lists_every_command() -> None:
-    result = invoke("--help")
-    assert result.exit_code == 0
+    result = done("--help")
     for name, entry in main.table.items():
         assert f"  {name} " in result.output
         assert entry.help in result.output
@@ -98,8 +90,7 @@ def test_the_package_is_the_command_line_too() -> None:
 
 @pytest.mark.parametrize("name", sorted(main.table))
 def test_every_command_of_the_table_is_there(name: str) -> None:
-    result = invoke(name, "--help")
-    assert result.exit_code == 0
+    result = done(name, "--help")
     assert result.output.startswith("Usage: ")
 
 
@@ -228,8 +219,7 @@ def test_an_interrupt_during_the_imports_is_one_line() -> None:
     ],
 )
 def test_an_unknown_command_suggests_the_one_that_is_meant(word: str, meant: str) -> None:
-    result = invoke(word)
-    assert result.exit_code == 2
+    result = done(word, code=2)
     assert meant in result.stderr
 
 

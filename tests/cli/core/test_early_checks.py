@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 
 BENCH = """schema = 1
 kind = "bench"
@@ -64,8 +64,7 @@ def test_what_is_refused_without_a_bus(
         (tmp_path / f"{name}.toml").write_text(
             'schema = 1\nkind = "programme"\n' + STEP.format(winch)
         )
-    result = invoke(*line.split())
-    assert result.exit_code == code, result.output
+    result = done(*line.split(), code=code)
     assert message in result.stderr
     assert "Errno" not in result.stderr
 
@@ -114,6 +113,5 @@ def test_a_file_of_another_kind_is_named_by_its_kind(
     (tmp_path / "runs").mkdir()
     (tmp_path / "p.toml").write_text('schema = 1\nkind = "winch"\n')
     (tmp_path / "a.csv").write_text("time [s],motor_angle [rad]\n0,0\n1,1\n2,2\n")
-    result = invoke(*words.split())
-    assert result.exit_code == 3
+    result = done(*words.split(), code=3)
     assert message in result.stderr

@@ -14,7 +14,7 @@ import pytest
 
 from calibration_cases import EXACT, rows
 from can_commands import served, without_trip
-from command_line import examples, invoke
+from command_line import done, examples
 from robot_poses.truth import csv
 from served import Served as ServedCell
 from winchkit.cli.core.command import Example
@@ -102,8 +102,7 @@ def run(line: str, code: int = 0) -> None:
     before, _, written = before.partition(" > ")
     words = [w for word in shlex.split(before)[1:] for w in (sorted(glob(word)) or [word])]
     typed = Path(redirected.strip()).read_text(encoding="utf-8") if redirected else INPUT
-    result = invoke(*words, input=typed)
-    assert result.exit_code == code, f"{line}\nends with {result.exit_code}:\n{result.output}"
+    result = done(*words, input=typed, code=code)
     if written:
         Path(written.strip()).write_text(result.stdout, encoding="utf-8")
 

@@ -11,7 +11,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from command_line import commands, examples, invoke
+from command_line import commands, done, examples, invoke
 from winchkit.cli.core.command import LETTERS
 from winchkit.cli.core.messages import suggest_next
 
@@ -89,8 +89,7 @@ def test_a_letter_means_one_thing() -> None:
 
 
 def test_a_letter_that_a_command_lacks_is_explained() -> None:
-    result = invoke("sim", "record", "spiral-bench", "-p", "programme-demo")
-    assert result.exit_code == 2
+    result = done("sim", "record", "spiral-bench", "-p", "programme-demo", code=2)
     assert "'-p': it is --profile in every command" in result.stderr
 
 
@@ -152,8 +151,7 @@ def test_a_suggestion_can_be_copied(folder: Path, files: list[str], shown: str) 
 
 def test_a_file_from_standard_input(folder: Path) -> None:
     assert "-: ok (programme" in invoke("check", "-", input=MOTION).stdout
-    wrong = invoke("check", "-", input=MOTION.replace("hold", "hald"))
-    assert wrong.exit_code == 3
+    wrong = done("check", "-", input=MOTION.replace("hold", "hald"), code=3)
     assert "\n-:4: step[1].hald: unknown key; did you mean 'hold'?" in wrong.stderr
     (folder / "m.toml").write_text(MOTION)
     assert invoke("sim", "record", "spiral-bench", "m.toml", "--rate", "10 Hz").exit_code == 0
@@ -181,8 +179,7 @@ def test_a_file_from_standard_input(folder: Path) -> None:
 )
 def test_where_standard_input_cannot_be(words: tuple[str, ...], message: str) -> None:
     text = "" if words[0] == "size" else MOTION.replace('hold = "1 s"', 'ask = "ready?"')
-    result = invoke(*words, input=text)
-    assert result.exit_code == 2, result.output
+    result = done(*words, input=text, code=2)
     assert message in result.stderr
 
 

@@ -89,7 +89,6 @@ def test_a_log_that_is_interrupted_ends_with_its_rows_too(
 def test_monitor_ends_at_a_signal(served: Path, number: int, code: int) -> None:
     """Ctrl-C is its usual end."""
     with start("monitor", "-b", served, "--json") as process:
-        assert process.stdout is not None
         assert json.loads(process.stdout.readline())["winch"]
         process.send_signal(number)
         process.communicate(timeout=60)

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 import pytest
 
-from command_line import commands, invoke
+from command_line import commands, done
 from winchkit.cli.core.quantity_type import QuantityType, naming
 from winchkit.errors import UsageError
 from winchkit.units import parse
@@ -60,8 +60,7 @@ def test_a_wrong_unit_names_the_option(words: str, parameter: click.Parameter) -
     name = naming(parameter)
     values = [WRONG] * parameter.nargs
     given = [name, *values] if isinstance(parameter, click.Option) else ["A", *values]
-    result = invoke(*words.split(), *given)
-    assert result.exit_code == 2
+    result = done(*words.split(), *given, code=2)
     assert name in result.stderr
     assert f"'{WRONG}'" in result.stderr
     assert isinstance(parameter.type, QuantityType)
@@ -86,8 +85,7 @@ def test_a_wrong_unit_within_a_value_names_the_option(
         "log": ["-o", "log.csv", "-b", "bench.toml"],
         "move": ["-b", "bench.toml"],
     }[words]
-    result = invoke(*words.split(), *more, f"--{name}", COMPOUND[option])
-    assert result.exit_code == 2, result.stderr
+    result = done(*words.split(), *more, f"--{name}", COMPOUND[option], code=2)
     assert f"--{name}" in result.stderr
     assert "furlongs" in result.stderr
 
@@ -113,9 +111,7 @@ def _is(text: str, dimension: str) -> bool:
 
 
 def test_a_bound_is_given_with_its_option() -> None:
-    result = invoke("move", "--to", "1e9m")
-    assert result.exit_code == 2
+    result = done("move", "--to", "1e9m", code=2)
     assert "--to: '1e9m' must be at most 100000 m" in result.stderr
-    result = invoke("log", "--for", "-3s")
-    assert result.exit_code == 2
+    result = done("log", "--for", "-3s", code=2)
     assert "--for: '-3s' is below zero" in result.stderr

@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+from command_line import own_process
+
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 PROGRAM = """
@@ -30,15 +32,7 @@ finish(command)
 
 
 def run(program: str, **options: object) -> subprocess.CompletedProcess[str]:
-    done: subprocess.CompletedProcess[str] = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-        **options,  # type: ignore[call-overload]
-    )
-    return done
+    return own_process(sys.executable, "-c", program, code=None, **options)
 
 
 @pytest.mark.parametrize(

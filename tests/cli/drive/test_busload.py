@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line import invoke
+from command_line import done, invoke
 from winchkit.drivers.can.bus.load import FrameKind, frame_bits, load_of
 from winchkit.errors import NotPermitted
 
@@ -83,8 +83,7 @@ def bench(folder: Path, winches: int, cycle: str) -> Path:
 
 
 def test_the_command_counts_the_pdos_of_the_device_file(tmp_path: Path) -> None:
-    result = invoke("busload", bench(tmp_path, 2, "4 ms"), "--json")
-    assert result.exit_code == 0, result.output
+    result = done("busload", bench(tmp_path, 2, "4 ms"), "--json")
     load = json.loads(result.stdout)["bus"]["can"]
     sizes = {frame["name"]: frame["size"] for frame in load["frames"]}
     # Status word, position, mode; velocity, torque, error; control word and target velocity. The
@@ -107,8 +106,7 @@ def test_the_bench_may_be_an_option_as_in_other_commands(
     assert expected
     assert invoke("busload", "-b", file).stdout == expected
     assert invoke("busload", "--bench", file, file).stdout == expected
-    two = invoke("busload", file, "-b", "other.toml")
-    assert two.exit_code == 2
+    two = done("busload", file, "-b", "other.toml", code=2)
     assert "two bench files" in two.stderr
     monkeypatch.chdir(tmp_path)
     assert invoke("busload").stdout == expected
@@ -118,8 +116,7 @@ def test_the_bench_may_be_an_option_as_in_other_commands(
 
 
 def test_a_bus_that_is_too_full_fails_the_check(tmp_path: Path) -> None:
-    result = invoke("busload", bench(tmp_path, 8, "2 ms"))
-    assert result.exit_code == 1
+    result = done("busload", bench(tmp_path, 8, "2 ms"), code=1)
     assert "152" in result.stdout.split("%")[0]
     assert "fastest that fits: 4.4 ms" in result.stdout
     assert invoke("busload", bench(tmp_path, 8, "5 ms")).exit_code == 0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from can_commands import Served, served
-from command_line import invoke
+from command_line import done, invoke
 from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.sim.drive.nmt import NodeState
 
@@ -22,8 +22,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 
 def test_scan_finds_every_drive_and_the_file_that_fits(bench: Served) -> None:
-    result = invoke("scan", "-b", bench.file, "--json")
-    assert result.exit_code == 0, result.output
+    result = done("scan", "-b", bench.file, "--json")
     nodes = json.loads(result.stdout)["nodes"]
     assert [(item["node"], item["winch"], item["device"]) for item in nodes] == [
         (1, "A", "generic-cia402"),
@@ -37,8 +36,7 @@ def test_scan_finds_every_drive_and_the_file_that_fits(bench: Served) -> None:
 
 def test_scan_by_interface_needs_no_bench(bench: Served) -> None:
     channel = bench.live.bench_spec.bus["can"].channel
-    result = invoke("scan", "--interface", "virtual", "--channel", channel)
-    assert result.exit_code == 0, result.output
+    result = done("scan", "--interface", "virtual", "--channel", channel)
     assert result.stdout.count("fits generic-cia402") == 2
     assert "winch" not in result.stdout
 
@@ -58,8 +56,7 @@ def test_scan_by_interface_needs_no_bench(bench: Served) -> None:
 def test_wrong_input_to_commands_of_the_bus(
     arguments: tuple[str, ...], code: int, words: str
 ) -> None:
-    result = invoke(*arguments)
-    assert result.exit_code == code, result.output
+    result = done(*arguments, code=code)
     assert words in result.stderr
 
 
@@ -67,8 +64,7 @@ def test_info_says_what_the_drive_holds(bench: Served) -> None:
     drive = bench.live.winches["A"].drive
     drive.objects.put(0x1003, 1, 0x8611)
     drive.objects.put(0x1003, 0, 1)
-    result = invoke("info", "A", "-b", bench.file, "--json")
-    assert result.exit_code == 0, result.output
+    result = done("info", "A", "-b", bench.file, "--json")
     info = json.loads(result.stdout)
     assert info["name"] == "winch A"
     assert info["state"] == "switch on disabled"
@@ -91,8 +87,7 @@ def test_a_drive_that_is_nmt_stopped_is_named_as_such(bench: Served) -> None:
         drive.receive(0x000, bytes([0x02, 2]), bench.live._now())
     assert drive.nmt is NodeState.STOPPED
     try:
-        result = invoke("info", "B", "-b", bench.file)
-        assert result.exit_code == 4, result.output
+        result = done("info", "B", "-b", bench.file, code=4)
         assert "NMT stopped" in result.stderr
         assert "wiring" not in result.stderr
         (_, stopped) = stop_on_bus(bench.live.bench_spec)
@@ -104,16 +99,14 @@ def test_a_drive_that_is_nmt_stopped_is_named_as_such(bench: Served) -> None:
 
 def test_info_of_a_node_by_its_identity_alone(bench: Served) -> None:
     channel = bench.live.bench_spec.bus["can"].channel
-    result = invoke("info", "2", "--interface", "virtual", "--channel", channel)
-    assert result.exit_code == 0, result.output
+    result = done("info", "2", "--interface", "virtual", "--channel", channel)
     assert "node 2: generic" in result.stdout
     assert "brake" not in result.stdout
 
 
 @pytest.mark.parametrize("who", ["C", "a", "200", "0"])
 def test_who_is_not_there(bench: Served, who: str) -> None:
-    result = invoke("info", who, "-b", bench.file)
-    assert result.exit_code == 2
+    result = done("info", who, "-b", bench.file, code=2)
     assert "there is A, B, or a node number from 1 to 127" in result.stderr
 
 
@@ -123,19 +116,16 @@ def test_settings_make_the_round_trip(bench: Served, tmp_path: Path, suffix: str
     objects = bench.live.winches["A"].drive.objects
     objects.put(0x6085, 0, 123_456)
     objects.put(0x607D, 1, -1_000_000)
-    saved = invoke("config", "save", "A", "-b", bench.file, "-o", file)
-    assert saved.exit_code == 0, saved.output
+    done("config", "save", "A", "-b", bench.file, "-o", file)
     assert invoke("config", "diff", "A", file, "-b", bench.file).exit_code == 0
     objects.put(0x6085, 0, 99)
     objects.put(0x607D, 1, -7)
-    differs = invoke("config", "diff", "A", file, "-b", bench.file, "--json")
-    assert differs.exit_code == 1
+    differs = done("config", "diff", "A", file, "-b", bench.file, "--json", code=1)
     found = {item["object"]: item for item in json.loads(differs.stdout)["differences"]}
     assert found["6085h"]["file"] == 123_456
     assert found["6085h"]["drive"] == 99
     assert set(found) == {"6085h", "607Dh:1"}
-    loaded = invoke("config", "load", "A", file, "-b", bench.file)
-    assert loaded.exit_code == 0, loaded.output
+    loaded = done("config", "load", "A", file, "-b", bench.file)
     assert bench.number(0x6085) == 123_456
     assert bench.number(0x607D, 1) == -1_000_000
     assert "2 settings written and read back" in loaded.stderr
@@ -169,8 +159,7 @@ def test_a_dry_run_writes_nothing(bench: Served, tmp_path: Path) -> None:
     tree["objects"] = {"6085h": 4321}
     file.write_text(json.dumps(tree))
     before = bench.number(0x6085)
-    shown = invoke("config", "load", "A", file, "-b", bench.file, "--dry-run")
-    assert shown.exit_code == 0, shown.output
+    shown = done("config", "load", "A", file, "-b", bench.file, "--dry-run")
     assert "write 6085h Quick stop deceleration = 4321 (10E1h)" in shown.stdout
     assert bench.number(0x6085) == before
     stored = invoke("config", "store", "A", "-b", bench.file, "--dry-run")
@@ -212,8 +201,7 @@ def test_files_that_are_no_settings(
     bench: Served, tmp_path: Path, name: str, text: str, words: str
 ) -> None:
     (tmp_path / name).write_text(text)
-    result = invoke("config", "diff", "A", tmp_path / name, "-b", bench.file)
-    assert result.exit_code == 3, result.output
+    result = done("config", "diff", "A", tmp_path / name, "-b", bench.file, code=3)
     assert words in result.stderr
 
 
@@ -222,8 +210,7 @@ def test_settings_of_another_kind_of_drive_are_refused(bench: Served, tmp_path: 
     identity = {"vendor": 0x26C, "product": 1}
     tree = {"schema": 1, "kind": "drive-config", "identity": identity, "objects": {"6085h": 5}}
     file.write_text(json.dumps(tree))
-    result = invoke("config", "load", "A", file, "-b", bench.file)
-    assert result.exit_code == 3
+    result = done("config", "load", "A", file, "-b", bench.file, code=3)
     assert "is of vendor 026Ch product 00000001h" in result.stderr
 
 
@@ -231,14 +218,11 @@ def test_store_and_restore_change_what_the_next_start_finds(bench: Served) -> No
     drive = bench.live.winches["B"].drive
     default = drive.objects.number(0x6085)
     drive.objects.put(0x6085, 0, 7777)
-    refused = invoke("config", "store", "B", "-b", bench.file, input="n\n")
-    assert refused.exit_code == 1
-    stored = invoke("config", "store", "B", "-b", bench.file, "--yes")
-    assert stored.exit_code == 0, stored.output
+    done("config", "store", "B", "-b", bench.file, input="n\n", code=1)
+    done("config", "store", "B", "-b", bench.file, "--yes")
     restart(bench)
     assert drive.objects.number(0x6085) == 7777
-    restored = invoke("config", "restore", "B", "-b", bench.file, input="y\n")
-    assert restored.exit_code == 0, restored.output
+    done("config", "restore", "B", "-b", bench.file, input="y\n")
     restart(bench)
     assert drive.objects.number(0x6085) == default
 

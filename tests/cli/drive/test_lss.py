@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 from click.testing import Result
 
-from command_line import invoke
+from command_line import done
 from lss_device import LssDevice
 
 IDENTITY = (0x26C, 0x12345, 0x10002, 0xDEADBEEF)
@@ -23,8 +23,9 @@ def device() -> Iterator[LssDevice]:
         yield running
 
 
-def lss(device: LssDevice, *arguments: object) -> Result:
-    return invoke("lss", *arguments, "--interface", "virtual", "--channel", device.channel)
+def lss(device: LssDevice, *arguments: object, code: int = 0) -> Result:
+    bus = ("--interface", "virtual", "--channel", device.channel)
+    return done("lss", *arguments, *bus, code=code)
 
 
 def address() -> list[str]:
@@ -34,7 +35,6 @@ def address() -> list[str]:
 
 def test_a_device_without_a_number_is_found_bit_by_bit(device: LssDevice) -> None:
     found = lss(device, "list", "--json")
-    assert found.exit_code == 0, found.output
     (identity,) = json.loads(found.stdout)["unconfigured"]
     assert tuple(identity.values()) == IDENTITY
     assert not device.selected, "it takes part in the network again"
@@ -43,13 +43,11 @@ def test_a_device_without_a_number_is_found_bit_by_bit(device: LssDevice) -> Non
 def test_a_configured_device_is_not_listed(device: LssDevice) -> None:
     device.node = 4
     found = lss(device, "list")
-    assert found.exit_code == 0
     assert found.stdout == "no device without a node number\n"
 
 
 def test_set_by_identity_and_store(device: LssDevice) -> None:
-    done = lss(device, "set", *address(), "--node", 9, "--new-bitrate", 500_000, "--store")
-    assert done.exit_code == 0, done.output
+    lss(device, "set", *address(), "--node", 9, "--new-bitrate", 500_000, "--store")
     assert (device.node, device.rate) == (9, 2)
     assert device.stored == (9, 2)
     assert not device.selected
@@ -59,7 +57,6 @@ def test_set_by_identity_and_store(device: LssDevice) -> None:
 
 def test_the_only_device_needs_no_address(device: LssDevice) -> None:
     done = lss(device, "set", "--only", "--node", 5)
-    assert done.exit_code == 0, done.output
     assert device.node == 5
     assert device.stored is None
     assert "vendor 026Ch" in done.stdout
@@ -77,23 +74,20 @@ def test_the_only_device_needs_no_address(device: LssDevice) -> None:
     ],
 )
 def test_wrong_input(device: LssDevice, arguments: tuple[str, ...], code: int, words: str) -> None:
-    result = lss(device, *arguments)
-    assert result.exit_code == code, result.output
+    result = lss(device, *arguments, code=code)
     assert words in result.stderr
     assert (device.node, device.rate) == (255, 0)
 
 
 def test_another_identity_does_not_answer(device: LssDevice) -> None:
     wrong = [*address()[:-1], "7"]
-    result = lss(device, "set", *wrong, "--node", 5)
-    assert result.exit_code == 4
+    result = lss(device, "set", *wrong, "--node", 5, code=4)
     assert "no device answers" in result.stderr
     assert device.node == 255
 
 
 def test_a_dry_run_shows_the_frames_and_sends_none(device: LssDevice) -> None:
     result = lss(device, "set", *address(), "--node", 9, "--store", "--dry-run")
-    assert result.exit_code == 0, result.output
     for words in ("select vendor 26Ch", "set node id 9", "store"):
         assert words in result.stdout
     assert device.node == 255

@@ -8,10 +8,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
+from command_line import done
 from winchkit import catalog
-from winchkit.cli.files.check import command
 
 SOURCE = catalog.find("devices", "generic-cia402").parent
 
@@ -29,9 +28,8 @@ def drive(
     return home / "device.toml"
 
 
-def check(path: Path) -> tuple[int, str]:
-    result = CliRunner().invoke(command, [str(path)])
-    return result.exit_code, result.output
+def check(path: Path, code: int = 0) -> str:
+    return done("check", path, code=code).output
 
 
 def line_of(path: Path, part: str) -> int:
@@ -41,8 +39,7 @@ def line_of(path: Path, part: str) -> int:
 
 @pytest.mark.parametrize("name", catalog.names("devices"))
 def test_every_device_that_we_ship_is_in_order(name: str) -> None:
-    result = CliRunner().invoke(command, ["--json", str(catalog.find("devices", name))])
-    assert result.exit_code == 0, result.output
+    result = done("check", "--json", catalog.find("devices", name))
     (entry,) = json.loads(result.stdout)["files"]
     assert entry["ok"]
     assert entry["faults"] == []
@@ -63,9 +60,7 @@ def test_the_units_of_a_device_file_are_shown_by_an_example(
 ) -> None:
     """Of 65 536 increments a turn."""
     path = drive(tmp_path, device=('speed_unit = "increments/s"', f'speed_unit = "{unit}"'))
-    code, output = check(path)
-    assert code == 0, output
-    assert f"a motor turn is 65536 of 6064h, {example} ({unit})" in output
+    assert f"a motor turn is 65536 of 6064h, {example} ({unit})" in check(path)
 
 
 @pytest.mark.parametrize(
@@ -81,9 +76,7 @@ def test_a_unit_that_cannot_be_is_a_fault_of_the_device_file(
     tmp_path: Path, line: str, said: str
 ) -> None:
     path = drive(tmp_path, device=('speed_unit = "increments/s"', line))
-    code, output = check(path)
-    assert code == 3
-    assert said in output
+    assert said in check(path, code=3)
 
 
 @pytest.mark.parametrize(
@@ -107,8 +100,7 @@ def test_what_does_not_fit_is_reported_with_its_line(
     if eds[0]:
         eds = (_between(*eds), "")
     path = drive(tmp_path, device=device, eds=eds)
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     told = [row for row in output.split("\n") if said in row]
     assert told, output
     assert told[0].startswith(f"{path}:{line_of(path, place)}: ")
@@ -140,9 +132,7 @@ def test_pdo_parameters_that_cannot_be_written_have_to_fit(
 ) -> None:
     """Trinamic's TMCM-6214 has RPDOs of the type 255 that cannot be changed."""
     path = drive(tmp_path, eds=fixed(*change))
-    code, output = check(path)
-    assert code == (3 if said else 0), output
-    assert said in output
+    assert said in check(path, code=(3 if said else 0))
 
 
 def test_more_objects_than_mapping_entries_are_reported(tmp_path: Path) -> None:
@@ -150,28 +140,23 @@ def test_more_objects_than_mapping_entries_are_reported(tmp_path: Path) -> None:
     eds = (SOURCE / "generic-cia402.eds").read_text(encoding="utf-8")
     begin = eds.index("[1600sub2]")
     path = drive(tmp_path, eds=(eds[begin : eds.index("[1601]", begin)], ""))
-    code, output = check(path)
-    assert code == 3
-    assert "rpdo 1 has 2 objects; 1600h has 1 mapping entries in the EDS" in output
+    assert "rpdo 1 has 2 objects; 1600h has 1 mapping entries in the EDS" in check(path, code=3)
 
 
 def test_a_transmission_type_as_the_drive_has_it_is_in_order(tmp_path: Path) -> None:
     written = ('"0x60FF"]', '"0x60FF"]\ntransmission = 255')
-    code, output = check(drive(tmp_path, device=written, eds=fixed("1400", 2, "255")))
-    assert code == 0, output
+    check(drive(tmp_path, device=written, eds=fixed("1400", 2, "255")))
 
 
 def test_modes_are_those_within_the_range_of_6060h(tmp_path: Path) -> None:
     """Faulhaber's EDS have no 6502h, but limit 6060h to -1 to 6."""
     name = "ParameterName=Modes of operation\n"
     path = drive(tmp_path, eds=(name, f"{name}LowLimit=-1\nHighLimit=6\n"))
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     assert f"{path}:{line_of(path, 'modes = ')}: " in output
     assert "CSV is 9 in 6060h, which the EDS limits to -1 to 6" in output
     assert "HM is 6" not in output
-    code, output = check(path.parent / "generic-cia402.eds")
-    assert code == 0
+    output = check(path.parent / "generic-cia402.eds")
     assert "\n  modes: PP, PV, PT, HM\n" in output
 
 
@@ -184,8 +169,7 @@ def _between(first: str, after: str) -> str:
 
 def test_warnings_of_the_eds_are_shown_and_do_not_fail(tmp_path: Path) -> None:
     path = drive(tmp_path, eds=("VendorNumber=0x0", "VendorNumber="))
-    code, output = check(path)
-    assert code == 0
+    output = check(path)
     eds = path.parent / "generic-cia402.eds"
     line = line_of(eds, "VendorNumber=")
     assert f"{eds}:{line}: [DeviceInfo] VendorNumber is empty; taken as 0 (warning)" in output
@@ -193,8 +177,7 @@ def test_warnings_of_the_eds_are_shown_and_do_not_fail(tmp_path: Path) -> None:
 
 def test_faults_of_the_eds_are_the_device_s(tmp_path: Path) -> None:
     path = drive(tmp_path, eds=("DataType=0x0007", "DataType=U32"))
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     assert "generic-cia402.eds:" in output
     assert "DataType 'U32' is not a number" in output
 
@@ -225,8 +208,7 @@ def bench_of(folder: Path) -> Path:
 
 def test_check_of_a_bench_reports_the_faults_of_its_device_files(tmp_path: Path) -> None:
     device = drive(tmp_path, device=('"0x6041", ', '"0x605A", '))
-    code, output = check(bench_of(tmp_path))
-    assert code == 3
+    output = check(bench_of(tmp_path), code=3)
     told = [row for row in output.split("\n") if "its PDOMapping is 0 in the EDS" in row]
     assert len(told) == 1, "the file is wired twice and told once"
     assert told[0].startswith(f"{device}:{line_of(device, '0x605A')}: ")
@@ -234,8 +216,7 @@ def test_check_of_a_bench_reports_the_faults_of_its_device_files(tmp_path: Path)
 
 def test_check_of_a_bench_reports_how_each_drive_notices_a_dead_host(tmp_path: Path) -> None:
     drive(tmp_path)
-    code, output = check(bench_of(tmp_path))
-    assert code == 0
+    output = check(bench_of(tmp_path))
     for winch in "AB":
         assert f"winch {winch}: loss of the host by heartbeat: it reacts as set in 6007h" in output
 
@@ -249,18 +230,16 @@ def test_a_bench_is_refused_where_a_drive_notices_no_dead_host(tmp_path: Path) -
         text = text[:begin] + text[text.index("[", begin + 1) :]
     (path.parent / "generic-cia402.eds").write_text(text, encoding="utf-8")
     bench = bench_of(tmp_path)
-    code, output = check(bench)
-    assert code == 3
+    output = check(bench, code=3)
     for winch in "AB":
         assert f"{bench}: winch {winch}, device 'generic-cia402': the EDS has no way" in output
-    assert check(path)[0] == 0, "hardware may stop it: that is the bench file's to say"
+    check(path)  # hardware may stop it: that is the bench file's to say
 
 
 def test_an_option_code_that_the_eds_lacks_is_reported(tmp_path: Path) -> None:
     path = drive(tmp_path, eds=(_between("[605D]", "[605E]"), ""))
     path.write_text(path.read_text(encoding="utf-8") + "[servo.options]\nhalt = 1\n")
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     assert f"{path}:{line_of(path, 'halt = 1')}: " in output
     assert "the EDS lacks 605Dh; the drive has no such option code" in output
 
@@ -268,17 +247,16 @@ def test_an_option_code_that_the_eds_lacks_is_reported(tmp_path: Path) -> None:
 def test_a_fixed_mapping_is_taken_as_it_is(tmp_path: Path) -> None:
     count = _between("[1A01sub0]", "[1A01sub1]")
     path = drive(tmp_path, eds=(count, count.replace("AccessType=rw", "AccessType=const")))
-    assert check(path)[0] == 0, "the device file has the mapping of the EDS"
+    check(path)  # the device file has the mapping of the EDS
     text = path.read_text(encoding="utf-8")
     path.write_text(text.replace('"0x606C", "0x6077"', '"0x6077", "0x606C"'), encoding="utf-8")
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     assert 'fixed mapping in the EDS: objects = ["0x606C", "0x6077", "0x603F"]' in output
 
 
 def test_a_device_file_may_rest_on_its_eds_alone(tmp_path: Path) -> None:
     path = drive(tmp_path, device=('trust = "generic"', 'trust = "eds"'))
-    assert check(path)[0] == 0
+    check(path)
 
 
 @pytest.mark.parametrize(
@@ -295,22 +273,19 @@ def test_a_way_to_notice_a_dead_host_has_to_fit_the_file(
     text = path.read_text(encoding="utf-8")
     text = text.replace('motion_mode = "CSV"\n', "", 1)
     path.write_text(text.replace("[servo]\n", f"[servo]\n{lines}\n", 1), encoding="utf-8")
-    code, output = check(path)
-    assert code == 3
-    assert said in output
+    assert said in check(path, code=3)
 
 
 def test_guarding_is_refused_where_the_adapter_sends_no_remote_frames(tmp_path: Path) -> None:
     path = drive(tmp_path, device=("[servo]\n", '[servo]\nhost_loss = "guarding"\n'))
     bench = bench_of(tmp_path)
-    assert check(path)[0] == 0
-    assert check(bench)[0] == 0
+    check(path)
+    check(bench)
     text = bench.read_text(encoding="utf-8").replace(
         '"virtual"', '"socketcand"\nhost = "127.0.0.1"\nport = 29536'
     )
     bench.write_text(text, encoding="utf-8")
-    code, output = check(bench)
-    assert code == 3
+    output = check(bench, code=3)
     assert "winch A: guarding needs remote frames, which 'socketcand' does not send" in output
 
 
@@ -318,7 +293,7 @@ def test_a_mode_whose_target_no_pdo_can_carry_is_left_out(tmp_path: Path) -> Non
     """As in the EDS of a gripper of Schunk, which has CSP, and 607Ah with PDOMapping 0."""
     target = _between("[607A]", "[607C]")
     path = drive(tmp_path, eds=(target, target.replace("PDOMapping=1", "PDOMapping=0")))
-    _, output = check(path.parent / "generic-cia402.eds")
+    output = check(path.parent / "generic-cia402.eds")
     assert "modes that winchkit can move it in: CSV, PV, IP\n" in output
     assert "note: winchkit does not move it in CSP: no RPDO can carry 607Ah" in output
 
@@ -326,5 +301,5 @@ def test_a_mode_whose_target_no_pdo_can_carry_is_left_out(tmp_path: Path) -> Non
 def test_a_control_word_that_no_pdo_can_carry_is_an_obstacle(tmp_path: Path) -> None:
     word = _between("[6040]", "[6041]")
     path = drive(tmp_path, eds=(word, word.replace("PDOMapping=1", "PDOMapping=0")))
-    _, output = check(path.parent / "generic-cia402.eds")
+    output = check(path.parent / "generic-cia402.eds")
     assert "not movable: no RPDO can carry 6040h: its PDOMapping is 0 in the EDS" in output

@@ -6,17 +6,15 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
+from command_line import done
 from winchkit import catalog
-from winchkit.cli.files.check import command
 
 SOURCE = catalog.find("devices", "generic-cia404").parent
 
 
-def check(path: Path) -> tuple[int, str]:
-    result = CliRunner().invoke(command, [str(path)])
-    return result.exit_code, result.output
+def check(path: Path, code: int = 0) -> str:
+    return done("check", path, code=code).output
 
 
 def instrument(folder: Path, device: tuple[str, str] = ("", ""), eds: str = "") -> Path:
@@ -71,16 +69,14 @@ def test_a_canopen_instrument_is_checked_against_its_eds(
     tmp_path: Path, device: tuple[str, str], eds: str, said: str
 ) -> None:
     path = instrument(tmp_path, device, eds)
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     told = [row for row in output.split("\n") if said in row]
     assert told, output
     assert told[0].startswith(f"{path}:")
     bench = tmp_path / "bench.toml"
     text = BENCH.format(kind="modbus-rtu", role="cell", bus="can", address="node = 9")
     bench.write_text(text, encoding="utf-8")
-    code, output = check(bench)
-    assert (code, said in output) == (3, True)
+    assert said in check(bench, code=3)
 
 
 def test_the_value_may_be_an_integer_of_the_eds(tmp_path: Path) -> None:
@@ -89,7 +85,7 @@ def test_the_value_may_be_an_integer_of_the_eds(tmp_path: Path) -> None:
         ('unit = "N"', 'unit = "N"\ntype = "integer"\nscale = 0.1'),
         "6130sub1|DataType=0x0008|DataType=0x0004",
     )
-    assert check(path)[0] == 0
+    check(path)
 
 
 MODBUS = """\
@@ -138,12 +134,11 @@ def test_an_instrument_measures_what_its_role_needs(
     home = tmp_path / "mine"
     home.mkdir()
     (home / "device.toml").write_text(MODBUS.format(unit=unit), encoding="utf-8")
-    assert check(home / "device.toml")[0] == 0
+    check(home / "device.toml")
     bench = tmp_path / "bench.toml"
     text = BENCH.format(kind="modbus-rtu", role=role, bus="line", address="unit = 1")
     bench.write_text(text, encoding="utf-8")
-    code, output = check(bench)
-    assert code == (3 if said else 0), output
+    output = check(bench, code=(3 if said else 0))
     assert said in output
     if said:
         assert f"{bench}:14: winch.A.{role}.device: 'mine' {said}" in output
@@ -158,9 +153,8 @@ def test_a_frame_that_contains_its_terminator_is_refused(tmp_path: Path) -> None
         'example = "\\u0002-  12.34G{end}"\n[stream.letter.state]\nG = "gross"\n'
     )
     path.write_text(body.format(end="\\u0003"), encoding="utf-8")
-    code, output = check(path)
-    assert code == 3
+    output = check(path, code=3)
     assert "stream.example: '\\x02-  12.34G\\x03' contains the terminator" in output
     assert "stream.frame: '\\x02{value:8}{state:1}\\x03' contains the terminator" in output
     path.write_text(body.format(end=""), encoding="utf-8")
-    assert check(path)[0] == 0
+    check(path)

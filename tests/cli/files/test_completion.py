@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 
-from command_line import invoke
+from command_line import done, own_process
 from winchkit import catalog
 from winchkit.cli import main
 
@@ -41,9 +41,8 @@ def complete(line: str, **environment: str) -> list[str]:
         "_WINCHKIT_COMPLETE": "bash_complete",
         **environment,
     }
-    done = invoke(env=words, prog_name="winchkit")
-    assert done.exit_code == 0, done.output
-    return [item.partition(",")[2] for item in done.stdout.splitlines() if item]
+    result = done(env=words, prog_name="winchkit")
+    return [item.partition(",")[2] for item in result.stdout.splitlines() if item]
 
 
 @pytest.mark.usefixtures("folder")
@@ -85,8 +84,7 @@ def test_a_bench_in_the_environment_has_winches_too() -> None:
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_the_script_of_each_shell(shell: str) -> None:
-    result = invoke("completion", shell)
-    assert result.exit_code == 0
+    result = done("completion", shell)
     assert f"_WINCHKIT_COMPLETE={shell}_complete" in result.stdout
     if shell == "bash":
         subprocess.run(["bash", "-n"], input=result.stdout, text=True, check=True)
@@ -101,20 +99,13 @@ def test_bash_itself_completes() -> None:
         'eval "$(winchkit completion bash)" && COMP_WORDS=(winchkit ledger -p bench-sp) '
         '&& COMP_CWORD=3 && _winchkit_completion winchkit bench-sp -p && echo "${COMPREPLY[*]}"'
     )
-    done = subprocess.run(
-        ["bash", "--norc", "-c", line],
-        env={**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"]},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    environment = {**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"]}
+    done = own_process("bash", "--norc", "-c", line, code=None, env=environment)
     assert done.stdout.split() == ["bench-spiral"], done.stderr
 
 
 def test_an_unknown_shell() -> None:
-    result = invoke("completion", "ksh")
-    assert result.exit_code == 2
+    result = done("completion", "ksh", code=2)
     assert "'bash', 'zsh', 'fish'" in result.stderr
 
 
@@ -161,6 +152,5 @@ def test_every_option_has_an_environment_variable() -> None:
 
 def test_an_environment_variable_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("WINCHKIT_CONFIG_SAVE_BENCH", "none.toml")
-    result = invoke("config", "save", "A", "-o", "a.json")
-    assert result.exit_code == 3
+    result = done("config", "save", "A", "-o", "a.json", code=3)
     assert "none.toml: there is no such file" in result.stderr

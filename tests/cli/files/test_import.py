@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from command_line import invoke
+from command_line import done
 from logger_layouts import COUNTS, LAYOUTS, RATED, motion
 from winchkit.runs import read_run
 
 HEAD = "time [s],position [deg],speed [rpm],torque [%],force [N]"
 
 
-def command(*arguments: str | Path) -> Result:
-    return invoke("import", *arguments)
+def command(*arguments: str | Path, code: int = 0) -> Result:
+    return done("import", *arguments, code=code)
 
 
 def log(path: Path, head: str = HEAD) -> Path:
@@ -42,7 +42,6 @@ def log(path: Path, head: str = HEAD) -> Path:
 
 def test_without_an_output_it_only_looks(tmp_path: Path) -> None:
     result = command(log(tmp_path / "log.csv"))
-    assert result.exit_code == 0
     assert "motor_velocity  rpm   0.10472    named" in result.stdout
     assert "? 'torque' is in %: of which torque?: --rated-torque \"2.4 N m\"" in result.stdout
     assert os.listdir(tmp_path) == ["log.csv"]
@@ -50,8 +49,7 @@ def test_without_an_output_it_only_looks(tmp_path: Path) -> None:
 
 def test_without_a_terminal_every_answer_is_named(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", HEAD.replace("force [N]", "cell [mV/V]"))
-    result = command(path, "-o", tmp_path / "runs")
-    assert result.exit_code == 2
+    result = command(path, "-o", tmp_path / "runs", code=2)
     for option in ("--rated-torque", "--sensitivity", "--capacity"):
         assert option in result.stderr
     assert not (tmp_path / "runs").exists()
@@ -64,11 +62,9 @@ def test_the_angle_of_a_recording_of_the_velocity_is_its_integral(tmp_path: Path
     lines = [f"{a:.2f},{b * 9.549297:.9g},{1 + 0.1 * b:.9g}" for a, b in zip(t, omega, strict=True)]
     path = tmp_path / "drive.csv"
     path.write_text("\n".join(["time [s],speed [rpm],torque [Nm]", *lines]) + "\n")
-    refused = command(path, "-o", tmp_path / "runs")
-    assert refused.exit_code == 2
+    refused = command(path, "-o", tmp_path / "runs", code=2)
     assert "integral of motor_velocity" in refused.stderr
     result = command(path, "-o", tmp_path / "runs", "--yes")
-    assert result.exit_code == 0
     assert "an offset of the velocity is a drift" in result.stderr
     run = read_run(tmp_path / "runs" / "drive.csv")
     # The trapezoidal rule errs by the span times h²/12 of the second derivative of ω.
@@ -83,8 +79,7 @@ def test_two_recordings_of_the_velocity_are_two_runs(tmp_path: Path) -> None:
         rows = (f"{k / 100},{first + k % 3},{k % 5}" for k in range(100))
         paths.append(tmp_path / f"{name}.csv")
         paths[-1].write_text("\n".join(["time [s],speed [rpm],torque [Nm]", *rows]) + "\n")
-    result = command(*paths, "-o", tmp_path / "runs", "--yes")
-    assert result.exit_code == 0
+    command(*paths, "-o", tmp_path / "runs", "--yes")
     assert sorted(os.listdir(tmp_path / "runs")) == ["a.csv", "b.csv", "mapping.toml"]
 
 
@@ -93,14 +88,12 @@ def test_a_certain_guess_needs_no_consent_and_the_mapping_makes_the_next_import_
 ) -> None:
     path, runs = log(tmp_path / "log.csv"), tmp_path / "runs"
     first = command(path, "-o", runs, "--rated-torque", "2.4 N m", "--load-mass", "15 kg")
-    assert first.exit_code == 0, first.output
     assert first.stdout == f"{runs / 'log.csv'}\n"
     run = read_run(runs / "log.csv")
     assert run.load_mass == 15.0
     assert run.metadata["imported_from"] == "log.csv"
     assert run["motor_torque"] == pytest.approx(motion().torque, rel=1e-9)
     again = command(path, "-o", tmp_path / "again", "--mapping", runs / "mapping.toml")
-    assert again.exit_code == 0
     assert "confidence" not in again.stderr
     same = read_run(tmp_path / "again" / "log.csv")
     assert np.array_equal(same["motor_torque"], run["motor_torque"])
@@ -115,13 +108,11 @@ def test_a_lost_sign_is_not_accepted_by_yes(tmp_path: Path) -> None:
     rows = (f"{k / 100},{k}.5,{v if v >= 0 else 1024 - v}" for k, v in enumerate(loads))
     path = tmp_path / "servo.csv"
     path.write_text("time [s],position [deg],torque [mN m]\n" + "\n".join(rows) + "\n")
-    refused = command(path, "-o", tmp_path / "runs", "--yes")
-    assert refused.exit_code == 2
+    refused = command(path, "-o", tmp_path / "runs", "--yes", code=2)
     assert "11 bits stored without a sign (sign and magnitude" in refused.stderr
     assert '--unsigned "torque"' in refused.stderr
     assert not (tmp_path / "runs").exists()
-    taken = command(path, "-o", tmp_path / "runs", "--yes", "--unsigned", "torque")
-    assert taken.exit_code == 0, taken.output
+    command(path, "-o", tmp_path / "runs", "--yes", "--unsigned", "torque")
 
 
 def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path: Path) -> None:
@@ -129,10 +120,8 @@ def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path:
     path = tmp_path / "cell.csv"
     path.write_text("time [s],force [N]\n" + "\n".join(rows) + "\n")
     looked = command(path)
-    assert looked.exit_code == 0
     assert "no column is the motor angle or velocity: a run of a load cell alone" in looked.stdout
-    alone = command(path, "-o", tmp_path / "alone")
-    assert alone.exit_code == 0, alone.output
+    command(path, "-o", tmp_path / "alone")
     assert list(read_run(tmp_path / "alone" / "cell.csv")) == ["tension"]
     found = json.loads(command(path, "--json").stdout)["files"][0]
     assert any("motor_angle=COLUMN" in note for note in found["notes"])
@@ -148,7 +137,6 @@ def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path:
 def test_quiet_prints_no_table(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
     quiet = command(path, "-o", tmp_path / "runs", "-q", "-y")
-    assert quiet.exit_code == 0
     assert quiet.stdout == f"{tmp_path / 'runs' / 'log.csv'}\n"
     assert "confidence" not in quiet.stderr
     assert "confidence" in command(path, "-q").stdout, "without -o the table is the result"
@@ -162,23 +150,20 @@ def test_quiet_prints_what_was_changed_as_warnings(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t [s],angle [rad],speed [rad/s]\n" + "\n".join(rows) + "\n")
     quiet = command(path, "-o", tmp_path / "runs", "-q", "-y")
-    assert quiet.exit_code == 0
     assert "its sign is changed (warning)" in quiet.stderr
 
 
 def test_an_assumed_unit_needs_consent(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
-    refused = command(path, "-o", tmp_path / "runs")
-    assert refused.exit_code == 2
+    refused = command(path, "-o", tmp_path / "runs", code=2)
     assert "accept the guess by --yes" in refused.stderr
     assert "'tau' as motor_torque [N m] is assumed" in refused.stderr
-    assert command(path, "-o", tmp_path / "runs", "--yes").exit_code == 0
+    command(path, "-o", tmp_path / "runs", "--yes")
 
 
 def test_json_is_complete(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv")
     result = command(path, "--json", "-o", tmp_path / "runs", "--rated-torque", "2.4 N m")
-    assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["schema"] == 1
     (file,) = found["files"]
@@ -189,8 +174,7 @@ def test_json_is_complete(tmp_path: Path) -> None:
     (run,) = found["runs"]
     assert run["summary"]["rows"] == len(motion().time)
     assert found["mapping"] == str(tmp_path / "runs" / "mapping.toml")
-    opened = command(path, "--json", "-o", tmp_path / "other")
-    assert opened.exit_code == 2
+    opened = command(path, "--json", "-o", tmp_path / "other", code=2)
     (question,) = json.loads(opened.stdout)["files"][0]["questions"]
     assert question["options"][0] == '--rated-torque "2.4 N m"'
 
@@ -202,7 +186,6 @@ def test_findings_on_the_runs_are_reported(tmp_path: Path) -> None:
     rows = (f"{m.time[k]:.4f},{m.angle[k]:.6f},{m.tension[k]:.6f}\n" for k in kept)
     path.write_text("t [s],angle [rad],force [N]\n" + "".join(rows))
     result = command(path, "-o", tmp_path / "runs", "--json")
-    assert result.exit_code == 0, result.output
     found = {item["code"]: item for item in json.loads(result.stdout)["sanity"]}
     assert found["gap"]["channel"] == "time"
     assert found["gap"]["text"] in result.stderr
@@ -226,7 +209,6 @@ def test_a_drive_and_a_cell_with_clocks_of_their_own_become_one_run(tmp_path: Pa
         + "".join(f"{1e3 * a:.1f}\t{1e3 * b:.4f}\n" for a, b in zip(u, length, strict=True))
     )
     result = command(drive, laser, "-o", tmp_path / "runs", "--json")
-    assert result.exit_code == 0, result.output
     (joint,) = json.loads(result.stdout)["joints"]
     assert joint["method"] == "cross-correlation"
     assert joint["agreement"]["lag"] == pytest.approx(2.5, abs=2e-3)
@@ -234,50 +216,42 @@ def test_a_drive_and_a_cell_with_clocks_of_their_own_become_one_run(tmp_path: Pa
     slope = np.polyfit(run["motor_angle"], run["cable_length"], 1)[0]
     assert slope == pytest.approx(0.06, rel=1e-3)
     assert "cross-correlation" in run.metadata["joined"]
-    mapped = command(
-        drive, laser, "-o", tmp_path / "more", "--mapping", tmp_path / "runs" / "mapping.toml"
-    )
-    assert mapped.exit_code == 0, mapped.output
+    command(drive, laser, "-o", tmp_path / "more", "--mapping", tmp_path / "runs" / "mapping.toml")
 
 
 def test_recordings_are_never_written_over(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv")
     before = path.read_bytes()
     rated = ("--rated-torque", "2.4 N m")
-    result = command(path, "-o", tmp_path, *rated, "--replace")
-    assert result.exit_code == 2
+    result = command(path, "-o", tmp_path, *rated, "--replace", code=2)
     assert "would replace the imported file" in result.stderr
     assert path.read_bytes() == before
-    assert command(path, "-o", tmp_path / "runs", *rated).exit_code == 0
-    twice = command(path, "-o", tmp_path / "runs", *rated)
-    assert twice.exit_code == 2
+    command(path, "-o", tmp_path / "runs", *rated)
+    twice = command(path, "-o", tmp_path / "runs", *rated, code=2)
     assert "--replace" in twice.stderr
-    assert command(path, "-o", tmp_path / "runs", *rated, "--replace").exit_code == 0
+    command(path, "-o", tmp_path / "runs", *rated, "--replace")
 
 
 def test_files_of_one_name_become_different_runs(tmp_path: Path) -> None:
     for folder, unit in (("a", "[Nm]"), ("b", "[mNm]")):
         (tmp_path / folder).mkdir()
         log(tmp_path / folder / "log.csv", HEAD.replace("[%]", unit))
-    result = command(tmp_path / "a/log.csv", tmp_path / "b/log.csv", "-o", tmp_path / "runs")
-    assert result.exit_code == 0, result.output
+    command(tmp_path / "a/log.csv", tmp_path / "b/log.csv", "-o", tmp_path / "runs")
     assert sorted(os.listdir(tmp_path / "runs")) == ["log-2.csv", "log.csv", "mapping.toml"]
 
 
 def test_faults_of_all_files_are_reported_at_once(tmp_path: Path) -> None:
     good = log(tmp_path / "log.csv")
-    result = command(good, tmp_path / "none.csv", tmp_path, "-o", tmp_path / "runs")
-    assert result.exit_code == 3
+    result = command(good, tmp_path / "none.csv", tmp_path, "-o", tmp_path / "runs", code=3)
     assert "none.csv: there is no such file" in result.stderr
     assert "directory" in result.stderr
 
 
 def test_a_file_that_a_mapping_does_not_fit_is_refused(tmp_path: Path) -> None:
     path, runs = log(tmp_path / "log.csv", HEAD.replace("[%]", "[Nm]")), tmp_path / "runs"
-    assert command(path, "-o", runs).exit_code == 0
+    command(path, "-o", runs)
     other = log(tmp_path / "other.csv", "t [s],pos [deg],speed [rpm],torque [Nm],force [N]")
-    result = command(other, "-o", tmp_path / "more", "--mapping", runs / "mapping.toml")
-    assert result.exit_code == 3
+    result = command(other, "-o", tmp_path / "more", "--mapping", runs / "mapping.toml", code=3)
     assert "it lacks the columns 'time', 'position'" in result.stderr
 
 
@@ -289,8 +263,7 @@ def test_check_reads_a_mapping_with_every_fault(tmp_path: Path) -> None:
         'unit = "furlong"\n'
     )
     mapping.write_text(text)
-    result = invoke("check", mapping)
-    assert result.exit_code == 3
+    result = done("check", mapping, code=3)
     assert "mapping.toml:7: log[1].column[1].channel: 'tenson' is no channel" in result.stderr
     assert (
         "mapping.toml:12: log[1].column[2].unit: 'furlong' has no known SI value" in result.stderr
@@ -312,8 +285,7 @@ def test_invalid_options_are_refused_in_words(
     arguments: Sequence[str], text: str, tmp_path: Path
 ) -> None:
     path = log(tmp_path / "log.csv", HEAD.replace("[%]", "[Nm]"))
-    result = command(path, "-o", tmp_path / "runs", *arguments)
-    assert result.exit_code == 2, result.output
+    result = command(path, "-o", tmp_path / "runs", *arguments, code=2)
     assert text in result.stderr
 
 
@@ -363,8 +335,7 @@ def test_on_a_terminal_the_axes_of_a_long_table_are_separated(tmp_path: Path) ->
     run = read_run(tmp_path / "runs" / "log.csv")
     assert run["A.motor_angle"] == pytest.approx(m.angle)
     assert run["B.motor_angle"] == pytest.approx(-m.angle)
-    named = command(path, "-o", tmp_path / "again", "--axis", "winch")
-    assert named.exit_code == 0, named.output
+    command(path, "-o", tmp_path / "again", "--axis", "winch")
     assert (tmp_path / "again" / "log.csv").read_bytes().count(b"\n") > len(m.time)
 
 
@@ -396,8 +367,7 @@ def test_a_column_is_named_as_in_the_file_with_its_unit(angle: str, tmp_path: Pa
     """``q_deg`` is read as the name q and the unit deg; a user types what the file has."""
     path = log(tmp_path / "log.csv", "t_s,q_deg,spare,M_VOLT,force [N]")
     given = ("-c", f"motor_angle={angle}", "-c", "motor_torque=M_VOLT*2", "-c", "tension=")
-    result = command(path, "-o", tmp_path / "runs", "-y", *given)
-    assert result.exit_code == 0, result.output
+    command(path, "-o", tmp_path / "runs", "-y", *given)
     run, m = read_run(tmp_path / "runs" / "log.csv"), motion()
     assert run["motor_angle"] == pytest.approx(m.angle)
     assert run["motor_torque"] == pytest.approx(200 * m.torque / RATED)
@@ -458,8 +428,7 @@ def test_a_sample_rate_is_that_of_the_file_without_times(tmp_path: Path) -> None
     files = tmp_path / "drive.csv", tmp_path / "laser.csv"
     out = tmp_path / "out"
     own = "--sample-rate", "100 Hz", "--column", "motor_angle=position [rad]"
-    result = command(*files, "--join", *own, "--yes", "-o", out)
-    assert result.exit_code == 0, result.output
+    command(*files, "--join", *own, "--yes", "-o", out)
     run = read_run(out / "drive.csv")
     inside = np.isfinite(run["cable_length"])
     assert run["cable_length"][inside] == pytest.approx(0.06 * run["motor_angle"][inside], abs=2e-3)
@@ -473,8 +442,7 @@ def test_a_number_is_no_column_of_a_file_beside_one_that_has_it_as_a_name(tmp_pa
     (tmp_path / "cell.csv").write_text("time [s],tension [N]\n" + "".join(rows))
     files = tmp_path / "cell.csv", tmp_path / "log.txt"
     own = "--column", "time=1 [s]", "--column", "motor_angle=2 [rad]"
-    result = command(*files, *own, "--lag", "0 s", "--yes", "-o", tmp_path / "out")
-    assert result.exit_code == 0, result.output
+    command(*files, *own, "--lag", "0 s", "--yes", "-o", tmp_path / "out")
     run = read_run(tmp_path / "out" / "log.csv")
     assert run["motor_angle"] == pytest.approx(7 * run.time, abs=1e-3)
     assert run["tension"] == pytest.approx(100 - run.time, abs=1e-2)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import Result
 
-from command_line import invoke
+from command_line import done, invoke, own_process
 from fed import recording
 from winchkit import catalog
 from winchkit.bench.recording.provenance import git_state, origin
@@ -23,8 +22,7 @@ from winchkit.schema.read import read_simbench
 
 
 def run(*words: object, code: int = 0) -> Result:
-    result = invoke("log", *words)
-    assert result.exit_code == code, result.output
+    result = done("log", *words, code=code)
     return result
 
 
@@ -204,10 +202,8 @@ def test_git_state_versions_and_calibrations(tmp_path: Path) -> None:
 
     def git(*words: str) -> str:
         about = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
-        done = subprocess.run(
-            ["git", "-C", str(tmp_path), *about, *words], check=True, capture_output=True, text=True
-        )
-        return done.stdout.strip()
+        result = own_process("git", "-C", tmp_path, *about, *words)
+        return result.stdout.strip()
 
     git("init", "-q")
     file = tmp_path / "cell.toml"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke, own_process
 from model_files import edited
 from winchkit.catalog import find
 from winchkit.model.line import Line
@@ -99,8 +98,7 @@ def test_the_good_run_alone_lacks_nothing(good: Path) -> None:
 def test_faults_of_all_files_come_at_once(good: Path, tmp_path: Path) -> None:
     empty, none = tmp_path / "empty.csv", tmp_path / "none.csv"
     empty.write_text("")
-    result = invoke("compare", good, empty, none, "-p", "bench-spiral")
-    assert result.exit_code == 3
+    result = done("compare", good, empty, none, "-p", "bench-spiral", code=3)
     assert result.stderr.splitlines() == [
         f"{empty}: the file is empty",
         f"{none}: there is no such file",
@@ -111,8 +109,7 @@ def test_stretches_without_values_are_counted_and_not_filled(tmp_path: Path) -> 
     file = tmp_path / "holes.csv"
     lines = with_column("tension [N]", [None] * 80 + [""] * 40)
     file.write_text("".join(f"{line}\n" for line in lines))
-    result = invoke("compare", file, "-p", "bench-spiral", "--json")
-    assert result.exit_code == 0
+    result = done("compare", file, "-p", "bench-spiral", "--json")
     assert '"samples": 1' in result.stdout
     assert "NaN samples not compared: tension 40" in result.stdout
 
@@ -179,7 +176,7 @@ def test_a_process_ends_with_the_code_and_no_traceback(tmp_path: Path) -> None:
     file.write_bytes(bytes(range(256)))
     start = "from winchkit.cli import main; main()"
     command = [sys.executable, "-c", start, "compare", str(file), "-p", "bench-spiral"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stdout) == (3, "")
-    assert done.stderr.startswith(f"{file}: ")
-    assert "Traceback" not in done.stderr
+    result = own_process(*command, code=None)
+    assert (result.returncode, result.stdout) == (3, "")
+    assert result.stderr.startswith(f"{file}: ")
+    assert "Traceback" not in result.stderr

@@ -9,25 +9,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from calibration_cases import EXACT, elastic_rows, rows
+from command_line import done, invoke
 from report_parsed import Page
 from robot_poses.truth import Row, csv
 from winchkit.catalog import find
-from winchkit.cli import main
 from winchkit.runs.read import read_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
 
 
-def invoke(*arguments: object) -> Result:
-    return CliRunner().invoke(main, ["calibrate", *map(str, arguments)])
+def calibrate(*arguments: object, code: int = 0) -> Result:
+    return done("calibrate", *arguments, code=code)
 
 
 def answer(*arguments: object, code: int = 0) -> dict[str, Any]:
-    result = invoke(*arguments, "--json")
-    assert result.exit_code == code, result.output
+    result = calibrate(*arguments, "--json", code=code)
     found: dict[str, Any] = json.loads(result.stdout)
     return found
 
@@ -76,7 +75,6 @@ def test_the_profile_written_is_the_robot_calibrated(run: Path, tmp_path: Path) 
             "2.winding_radius": line.winch.drum.winding_radius,
         }[name]
         assert there == pytest.approx(found["parameters"][name]["value"], abs=1e-9)
-    assert robot.fitted is not None
     assert robot.fitted.runs == ("poses.csv",)
     assert robot.fitted.poses == 81
     assert "1.exit_point.x" in robot.fitted.std
@@ -103,8 +101,7 @@ def test_an_effect_is_written_and_read_again(tmp_path: Path) -> None:
 
 def test_text_page_and_proposals(run: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    result = invoke("cabtive", run, "-o", tmp_path / "new.toml", "--next", 2, "--html", page)
-    assert result.exit_code == 0, result.output
+    result = calibrate("cabtive", run, "-o", tmp_path / "new.toml", "--next", 2, "--html", page)
     assert "position error" in result.stdout
     assert "measure next:" in result.stdout
     assert "fit: step 1" in result.stderr
@@ -176,8 +173,7 @@ def test_nominal_values_that_their_bounds_exclude_are_reported(run: Path, tmp_pa
 
 
 def refused(code: int, *arguments: object) -> str:
-    result = invoke(*arguments)
-    assert result.exit_code == code, result.output
+    result = calibrate(*arguments, code=code)
     assert "Traceback" not in result.output
     assert result.stdout == ""
     return result.stderr
@@ -258,11 +254,9 @@ def test_poses_come_from_runs_or_a_bench_or_a_simulated_robot(run: Path, tmp_pat
         [run, "--sim", "cabtive-robot"],
         ["-b", "robot.toml", "--sim", "cabtive-robot"],
     ):
-        refused = invoke("cabtive", *given, "-o", new)
-        assert refused.exit_code == 2
+        refused = calibrate("cabtive", *given, "-o", new, code=2)
         assert "or --sim for a simulated robot" in refused.output
-    other = invoke("cabtive", "--sim", "winding-device-robot", "-o", new)
-    assert other.exit_code == 2
+    calibrate("cabtive", "--sim", "winding-device-robot", "-o", new, code=2)
     assert not new.exists()
 
 
@@ -275,8 +269,9 @@ def test_poses_before_a_trip_are_kept_and_the_command_that_fits_them_is_named(
     sim, new = tmp_path / "robot.toml", tmp_path / "new.toml"
     fault = '[[fault]]\ntime = "40 s"\ntarget = "3.servo"\nkind = "silence"\n'
     sim.write_text(f"{text}\n{fault}")
-    stopped = invoke("cabtive", "--sim", sim, "--box", "20 mm", "--turn", "2 deg", "-o", new)
-    assert stopped.exit_code == 5, stopped.output
+    stopped = calibrate(
+        "cabtive", "--sim", sim, "--box", "20 mm", "--turn", "2 deg", "-o", new, code=5
+    )
     assert "winch 3" in stopped.stderr.partition("winchkit: ")[2]
     assert not new.exists()
     poses = read_run(tmp_path / "new-fit.csv")
@@ -286,6 +281,6 @@ def test_poses_before_a_trip_are_kept_and_the_command_that_fits_them_is_named(
     assert np.all(np.diff(poses.time) > 1.0)
     suggested = stopped.stderr.partition("next: winchkit ")[2].splitlines()[0].split()
     assert suggested[:2] == ["calibrate", "cabtive"]
-    again = invoke(*suggested[1:])
+    again = invoke(*suggested)
     assert again.exit_code in (0, 1), again.output
     assert "position error" in again.stdout

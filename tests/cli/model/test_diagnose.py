@@ -1,9 +1,11 @@
-"""What ``winchkit diagnose`` prints, and the report of a fit that ``--fit-report`` adds."""
+"""What ``winchkit diagnose`` prints, the report of its fit, and how Ctrl-C ends it."""
 
 from __future__ import annotations
 
 import json
 import re
+import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +13,13 @@ import pytest
 
 from calibration_cases import rows
 from command_line import done, invoke
-from model_files import write_runs
+from model_files import record_files, side_by_side, write_runs
 from report_answers import answer_of, diagnosis_of, recorded
 from robot_poses.truth import csv
+from sim_process import start
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Estimate, Step
+from winchkit.runs import read_run, write_run
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +88,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 @pytest.mark.slow
 def test_a_diagnosis_prints_its_fit(runs: list[Path]) -> None:
     options = ["diagnose", *runs, "--profile", "bench-spiral"]
-    shown = invoke(*options, "--fit-report")
-    assert shown.exit_code == 0, shown.output
+    shown = done(*options, "--fit-report")
     assert re.search(r"layer-thickness\.thickness_error: +4\.9\d+e-05 \+/- ", shown.stdout)
     found = json.loads(invoke(*options, "--json").stdout)["fit"]
     assert found["dof"] == found["n_observations"] - found["n_unknowns"]
@@ -97,7 +100,49 @@ def test_a_calibration_prints_its_fit(tmp_path: Path) -> None:
     poses = tmp_path / "poses.csv"
     poses.write_text(csv(rows()))
     options = ["calibrate", "cabtive", str(poses), "-o", str(tmp_path / "new.toml")]
-    shown = invoke(*options, "--fit-report")
-    assert shown.exit_code == 0, shown.output
+    shown = done(*options, "--fit-report")
     assert "[[Variables]]\n    1.exit_point.x:" in shown.stdout
     assert "reduced chi-square" in shown.stdout
+
+
+SLOW = """
+from pathlib import Path
+from time import sleep
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.model.stages import Stage
+
+def apply(length, at, values):
+    Path({marker!r}).touch()
+    sleep(600)
+    return length
+
+EFFECT = Effect(
+    "slow", Stage.LENGTH_INSTRUMENT, (Parameter("size", "m", 0.0, 1e-3),), apply,
+    ("cable_length",), what="never ends", formula="x", source="none", looks_like="nothing",
+    told_apart="nothing",
+)
+"""
+PATIENCE = 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("winch", ["all", "A"])
+def test_an_interrupted_diagnosis_waits_for_nothing(winch: str, tmp_path: Path) -> None:
+    runs, both = record_files(tmp_path), tmp_path / "both.csv"
+    write_run(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
+    marker, effects = tmp_path / "begun", tmp_path / "slow.py"
+    effects.write_text(SLOW.format(marker=str(marker)), encoding="utf-8")
+    asked = ("diagnose", both, "-p", "bench-spiral", "--winch", winch, "--effects", effects)
+    process = start(*asked)
+    try:
+        until = time.monotonic() + PATIENCE
+        while not marker.exists() and time.monotonic() < until and process.poll() is None:
+            time.sleep(0.05)
+        assert marker.exists()
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert told.split("\n")[-2:] == ["winchkit: interrupted", ""]
+    assert "Traceback" not in told

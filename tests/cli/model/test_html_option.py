@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import write_runs
 from report_answers import recorded
 from report_parsed import Page
@@ -122,7 +122,6 @@ def test_every_figure_of_the_page_is_written_as_png_svg_and_csv(written: Written
 
 def test_figures_need_a_folder_whose_parent_exists(runs: list[Path], tmp_path: Path) -> None:
     words = ["compare", runs[0], "-p", "bench-spiral", "--figures", str(tmp_path / "no" / "such")]
-    result = invoke(*words)
-    assert result.exit_code == 3
+    result = done(*words, code=3)
     assert "the figures cannot be written" in result.stderr
     assert "cable length" in result.stdout

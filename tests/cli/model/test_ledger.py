@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import SHIPPED, answer, record_files
 from winchkit.schema.read import read_profile
 
@@ -55,8 +55,7 @@ def test_every_step_is_noted_and_taken_back(
         assert restored.ledger == was.ledger
         before.write_text(path.read_text())
     assert first.read_text().split() == declared.read_text().split()
-    nothing = invoke("undo", "-p", first)
-    assert nothing.exit_code == 3
+    nothing = done("undo", "-p", first, code=3)
     assert "nothing to undo" in nothing.stderr
 
 
@@ -81,8 +80,7 @@ def test_an_effect_goes_without_runs_too(runs: list[Path], declared: Path, tmp_p
         ("add", "cell-gain", "--fit", *runs),
         ("undo",),
     ):
-        refused = invoke(*words, "-p", less, "-o", added)
-        assert refused.exit_code == 2
+        refused = done(*words, "-p", less, "-o", added, code=2)
         assert "exists already" in refused.stderr
         assert added.read_bytes() == before
     assert invoke("undo", "-p", less, "-o", added, "--replace").exit_code == 0
@@ -98,9 +96,8 @@ def test_an_effect_goes_without_runs_too(runs: list[Path], declared: Path, tmp_p
     ],
 )
 def test_what_cannot_be_is_said(arguments: tuple[str, ...], code: int, words: str) -> None:
-    done = invoke(*arguments)
-    assert done.exit_code == code
-    assert words in done.stderr
+    result = done(*arguments, code=code)
+    assert words in result.stderr
     assert not Path("x.toml").exists()
 
 

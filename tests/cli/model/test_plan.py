@@ -8,7 +8,7 @@ from typing import Any
 import click
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import answer, record_files, write_runs
 from winchkit.catalog import find
 from winchkit.cli.model.plan import suggest_run
@@ -79,9 +79,8 @@ def test_where_nothing_is_to_be_distinguished_it_shows_something_new(tmp_path: P
 
 
 def test_a_place_that_cannot_be_written_is_a_bad_file(fat: list[Path]) -> None:
-    done = invoke("plan", *fat, "-p", "bench-spiral", "-o", "/no/such/folder/next.toml")
-    assert done.exit_code == 3
-    assert "cannot be written" in done.stderr
+    result = done("plan", *fat, "-p", "bench-spiral", "-o", "/no/such/folder/next.toml", code=3)
+    assert "cannot be written" in result.stderr
 
 
 def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
@@ -89,8 +88,7 @@ def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
 ) -> None:
     bench = write_bench(BENCH.bench, tmp_path / "bench.toml")
     next_file = tmp_path / "wide.toml"
-    told = invoke("plan", *fat, "-p", "bench-spiral", "-b", bench, "-o", next_file)
-    assert told.exit_code == 0, told.stderr
+    done("plan", *fat, "-p", "bench-spiral", "-b", bench, "-o", next_file)
     limits = BENCH.bench.winch["A"].limits
     assert limits.length is not None
     programme = read_programme(next_file)
@@ -101,8 +99,7 @@ def test_with_a_bench_the_plan_uses_the_room_that_its_limits_leave(
     assert max(step.speed or 0.0 for step in programme.step) <= limits.speed
     loads = [step.load_mass for step in programme.step if step.load_mass is not None]
     assert all(load * 9.80665 < (limits.tension_high or 0.0) for load in loads)
-    wrong = invoke("plan", *fat, "-p", "bench-spiral", "-b", bench, "--winch", "B")
-    assert wrong.exit_code == 2
+    wrong = done("plan", *fat, "-p", "bench-spiral", "-b", bench, "--winch", "B", code=2)
     assert "has no winch 'B'; it has A" in wrong.stderr
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import SHIPPED, answer, record_files, side_by_side
 from winchkit.runs import read_run, write_run
 from winchkit.schema.read import read_profile
@@ -139,8 +139,7 @@ def test_add_fits_writes_and_is_reproduced(runs: list[Path], profile: Path, tmp_
     torque = found["outputs"]["motor_torque"]
     assert torque["rms_after"] < 0.5 * torque["rms_before"]
     assert torque["heldout_rms_after"] < 1.3 * torque["noise_rms"]
-    checked = invoke("check", better)
-    assert checked.exit_code == 0
+    checked = done("check", better)
     assert checked.stderr == ""
 
 
@@ -220,8 +219,7 @@ def test_options_of_add_come_in_any_order(
         else:
             words = {"EFFECT": "motor-coulomb", "NEW": str(new), "P": str(profile)}
             arguments.append(words.get(word, word.replace("=P", f"={profile}")))
-    result = invoke("add", *arguments)
-    assert result.exit_code == 0, result.stderr
+    done("add", *arguments)
     fitted = read_profile(new).effect[0].values["fitted"]
     assert fitted["runs"] == [run.name for run in runs[:2]]
 
@@ -238,16 +236,14 @@ def test_the_band_is_the_users(runs: list[Path]) -> None:
 def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     both = tmp_path / "both.csv"
     write_run(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
-    result = invoke("compare", both, "-p", "bench-spiral", "--json")
-    assert result.exit_code == 2
+    result = done("compare", both, "-p", "bench-spiral", "--json", code=2)
     assert result.stdout == ""
     assert "has the winches A, B; choose one with --winch" in result.stderr
     one = answer("compare", both, "-p", "bench-spiral", "--winch", "A")["outputs"]
     alone = answer("compare", runs[0], "-p", "bench-spiral")["outputs"]
     assert one["tension"]["rms"] == pytest.approx(alone["tension"]["rms"], rel=1e-6)
     assert one != answer("compare", both, "-p", "bench-spiral", "--winch", "B")["outputs"]
-    wrong = invoke("compare", both, "-p", "bench-spiral", "--winch", "C")
-    assert wrong.exit_code == 2
+    wrong = done("compare", both, "-p", "bench-spiral", "--winch", "C", code=2)
     assert "no winch 'C'; it has A, B" in wrong.stderr
     other = invoke("compare", runs[0], "-p", "bench-spiral", "--winch", "B")
     assert (other.exit_code, other.stdout) == (2, ""), "its metadata name winch A"
@@ -281,8 +277,7 @@ def test_all_winches_of_a_recording_each_by_itself(both: list[Path]) -> None:
 
 def test_all_winches_in_text_and_on_pages(both: list[Path], tmp_path: Path) -> None:
     page = tmp_path / "p.html"
-    told = invoke("diagnose", *both, "-p", "bench-spiral", "--winch", "all", "--html", page)
-    assert told.exit_code == 0
+    told = done("diagnose", *both, "-p", "bench-spiral", "--winch", "all", "--html", page)
     lines = told.stdout.splitlines()
     assert [line for line in lines if line.startswith("winch ")] == ["winch A", "winch B"]
     assert lines.index("all 2 winches") > lines.index("winch B")
@@ -314,8 +309,7 @@ def test_errors_of_all_winches(both: list[Path], tmp_path: Path) -> None:
     torque = {f["variable"]: f for f in each["shared"]["outputs"]["motor_torque"]["follows"]}
     assert torque["direction"]["common"] > 0.9 * torque["direction"]["share"]
     page = tmp_path / "c.html"
-    told = invoke(*asked, "--html", page)
-    assert told.exit_code == 0
+    told = done(*asked, "--html", page)
     assert "share of the errors' variance explained by" in told.stdout
     assert '<a href="c-B.html">B</a>' in page.read_text(encoding="utf-8")
     assert (tmp_path / "c-B.html").is_file()
@@ -327,14 +321,12 @@ def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> N
     path = tmp_path / "odd.csv"
     write_run(replace(run, channels=odd), path)
     asked = ("compare", path, "-p", "bench-spiral", "--winch", "all")
-    refused = invoke(*asked, "--html", tmp_path / "o.html")
-    assert refused.exit_code == 2
+    refused = done(*asked, "--html", tmp_path / "o.html", code=2)
     assert "no page for each of the winches" in refused.stderr
     assert list(answer(*asked)["winches"]) == ["x y", "x-y"]
 
 
 def test_all_winches_of_a_run_that_names_none(runs: list[Path]) -> None:
     alone = invoke("compare", *runs[:2], "-p", "bench-spiral")
-    each = invoke("compare", *runs[:2], "-p", "bench-spiral", "--winch", "all")
-    assert each.exit_code == 0
+    each = done("compare", *runs[:2], "-p", "bench-spiral", "--winch", "all")
     assert each.stdout == alone.stdout

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import answer, record_files
 from report_parsed import Page
 from winchkit.schema.read import read_profile
@@ -87,19 +87,16 @@ def test_a_file_with_initial_values_from_the_runs_explains_them(
     assert step["effects"] == ["my-drum"]
     size = step["parameters"]["my-drum"]["amplitude"]
     assert abs(size["value"] - 0.3e-3) < 5 * size["std"]
-    again = invoke("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered)
-    assert again.exit_code == 3
+    again = done("effects", "new", mine, "-p", "bench-spiral", "--fit", *cornered, code=3)
     assert "exists already" in again.stderr
 
 
 def test_a_curve_of_ones_choice_and_one_that_is_none(cornered: list[Path], tmp_path: Path) -> None:
     mine = tmp_path / "speed.py"
     common = ("-p", "bench-spiral", "--fit", *cornered, "--curve")
-    done = invoke("effects", "new", mine, *common, "empirical-motor-torque-speed", "--id", "drag")
-    assert done.exit_code == 0
+    done("effects", "new", mine, *common, "empirical-motor-torque-speed", "--id", "drag")
     assert "drag" in invoke("effects", "--effects", mine).stdout
-    wrong = invoke("effects", "new", tmp_path / "x.py", *common, "motor-coulomb")
-    assert wrong.exit_code == 2
+    wrong = done("effects", "new", tmp_path / "x.py", *common, "motor-coulomb", code=2)
     assert "no empirical effect" in wrong.stderr
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from model_files import HEIGHT, KINK, SHIPPED, answer, kinked, record_files
 
 
@@ -59,8 +59,7 @@ def test_an_own_effect_is_added_and_then_belongs_to_the_profile(
     assert after["heldout_rms_after"] < 1.3 * after["noise_rms"]
     compared = answer("compare", *bent, "-p", new, "--effects", mine)["outputs"]
     assert compared["cable_length"]["rms"] == pytest.approx(after["rms_after"], rel=0.01)
-    without = invoke("compare", *bent, "-p", new)
-    assert without.exit_code == 3
+    without = done("compare", *bent, "-p", new, code=3)
     assert without.stderr.startswith(f"{new}:")
     assert "no effect 'kinked-rope'" in without.stderr
 

@@ -23,28 +23,10 @@ from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand
 
-TIGHT = """\
-schema = 1
-kind = "programme"
-name = "tight"
-repeat = 2
-
+_STEPS = """\
 [[step]]
-ask = "hang the 10 kg load"
-load_mass = "10 kg"
-[[step]]
-to = "3.15 m"
-speed = "0.2 m/s"
-[[step]]
-hold = "2 s"
-[[step]]
-to = "3 m"
-speed = "0.2 m/s"
-[[step]]
-hold = "2 s"
-[[step]]
-ask = "hang the 20 kg load"
-load_mass = "20 kg"
+ask = "hang the {load} load"
+load_mass = "{load}"
 [[step]]
 to = "3.15 m"
 speed = "0.2 m/s"
@@ -56,6 +38,9 @@ speed = "0.2 m/s"
 [[step]]
 hold = "2 s"
 """
+TIGHT = 'schema = 1\nkind = "programme"\nname = "tight"\nrepeat = 2\n' + "".join(
+    _STEPS.format(load=load) for load in ("10 kg", "20 kg")
+)
 """Two loads over a hand's breadth of cable: what yields, and not where."""
 SHORT = Path(__file__).parents[3] / "examples" / "short.toml"
 BENCH = "spiral-bench"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done
 
 
 @pytest.fixture
@@ -38,8 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_wrong_input_ends_it_with_one_line(
     folder: Path, arguments: list[str], code: int, message: str
 ) -> None:
-    result = invoke("serve", "--no-browser", *arguments)
-    assert result.exit_code == code, result.output
+    result = done("serve", "--no-browser", *arguments, code=code)
     assert result.stdout == "", "no URL"
     (line,) = result.stderr.strip().splitlines()
     assert message in line

@@ -45,7 +45,6 @@ class Rig:
         self.seen: list[tuple[int, bytes]] = []
         self._port = can.Bus(interface="virtual", channel=self.channel)
         found = device()
-        assert found.process is not None
         eds = Path(found.path).parent / found.process.eds
         self.node = SimInstrument(
             found.process, eds, NODE, lambda: self.force, self._send, now=time.monotonic()
@@ -89,6 +88,7 @@ def read(rig: Rig) -> Iterator[tuple[ProcessInstrument, SlowDevices]]:
     bus = CanBus(BusSpec("can", interface="virtual", channel=rig.channel), "can", CLOCK)
     instrument = ProcessInstrument("cell", device(), NODE, bus, CLOCK)
     slow = SlowDevices([ProcessLine("can", (instrument,), CLOCK)])
+    until(lambda: instrument.latest is not None)
     yield instrument, slow
     slow.close()
     bus.close()
@@ -100,7 +100,6 @@ def test_values_come_by_tpdo_with_their_times(
     instrument, _ = read
     until(lambda: instrument.counters.readings > 5)
     reading = instrument.latest
-    assert reading is not None
     assert reading.value == pytest.approx(123.25)
     assert reading.t_sample < reading.t_receive - 0.02
     assert instrument.problem is None
@@ -113,11 +112,9 @@ def test_overload_and_a_broken_sensor_are_no_numbers(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     for kind, flag in (("overload", Quality.OVERLOAD), ("sensor break", Quality.FAULT)):
         rig.node.inject(kind)
         until(lambda flag=flag: bool(instrument.latest and flag in instrument.latest.quality))  # type: ignore[misc]
-        assert instrument.latest is not None
         assert math.isnan(instrument.latest.value)
         rig.node.inject("recover")
         until(lambda: bool(instrument.latest and instrument.latest.quality.usable))
@@ -127,7 +124,6 @@ def test_a_silent_node_is_reported_and_set_up_again(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     rig.node.inject("silence")
     until(lambda: instrument.problem is not None)
     assert isinstance(instrument.problem, NoReply)
@@ -141,7 +137,6 @@ def test_a_node_that_reboots_sends_again(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, _ = read
-    until(lambda: instrument.latest is not None)
     rig.node.inject("reboot")
     until(lambda: instrument.counters.reconnects >= 1)
     count = instrument.counters.readings
@@ -152,7 +147,6 @@ def test_commands_are_written_and_the_eeprom_on_purpose_only(
     rig: Rig, read: tuple[ProcessInstrument, SlowDevices]
 ) -> None:
     instrument, slow = read
-    until(lambda: instrument.latest is not None)
     slow.command(instrument, "tare")
     assert any(
         identifier == 0x600 + NODE and data[1:] == bytes((0x04, 0x21, 0x00, 0xBA, 0xC1, 0, 0))
@@ -176,7 +170,6 @@ def test_values_are_asked_for_where_none_are_sent(rig: Rig) -> None:
     slow = SlowDevices([ProcessLine("can", (instrument,), CLOCK)])
     try:
         until(lambda: instrument.counters.readings > 3)
-        assert instrument.latest is not None
         assert instrument.latest.value == pytest.approx(123.25)
         assert not any(identifier == 0x180 + NODE and data for identifier, data in rig.seen[:2])
     finally:
@@ -188,7 +181,6 @@ def test_a_simulated_thermometer_shows_kelvin(tmp_path: Path) -> None:
     """A unit with another zero than SI's was shown without it."""
     declared = catalog.find("devices", "generic-cia404")
     process = device().process
-    assert process is not None
     eds = declared.parent / process.eds
     text = declared.read_text().replace('unit = "N"', 'unit = "K"')
     warm = tmp_path / declared.name

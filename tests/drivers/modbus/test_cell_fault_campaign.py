@@ -56,7 +56,6 @@ def test_every_fault_has_its_counter() -> None:
 @pytest.mark.parametrize("device", DEVICES)
 def test_each_fault_is_counted_and_reports_no_wrong_number(device: str, rtu: bool) -> None:
     modbus = spec_of(device).modbus
-    assert modbus is not None
     share = 0.2 if modbus.status_read is None else 0.1
     for fault in FAULTS:
         outcome = play(Plan(device, rtu, f"{device}/{fault}", (fault,), share, seconds=4.0))
@@ -99,7 +98,6 @@ def test_an_overload_is_flagged_and_is_no_number(device: str) -> None:
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_word_order_that_is_wrong_in_the_file_is_reported(device: str, rtu: bool) -> None:
     modbus = spec_of(device).modbus
-    assert modbus is not None
     if all(item.type in ("u16", "i16") for item in modbus.field):
         pytest.skip("one register has no order of words")
     outcome = play(Plan(device, rtu, f"{device}/swap", (), seconds=4.0, swapped=True))
@@ -113,7 +111,6 @@ def test_a_word_order_that_is_wrong_in_the_file_is_reported(device: str, rtu: bo
 def test_a_wrong_word_order_reports_no_number_of_an_empty_cell(device: str, largest: int) -> None:
     """Few counts with their words turned are many, and within what the device can show."""
     modbus = spec_of(device).modbus
-    assert modbus is not None
     if any(item.type in ("u16", "i16", "f32") for item in modbus.field):
         pytest.skip("one register has no order of words; floats are told by themselves")
     plan = Plan(device, True, f"{device}/few", (), seconds=4.0, swapped=True, largest=largest)

@@ -1,16 +1,19 @@
-"""Frames as the manuals print them, the numbers worked by hand."""
+"""Frames as manuals and our page show them, the numbers worked by hand."""
 
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import pytest
 
-from stream_rig import DEVICES, device
+from stream_rig import DEVICES, device, stream
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import FrameType, StreamContent, check_sum
 from winchkit.drivers.stream.parser import StreamParser
 from winchkit.schema.devices.stream import ChecksumSpec
+from winchkit.schema.read import read_device
 
 G = 9.80665
 GOOD, UNSTABLE = Quality.GOOD, Quality.UNSTABLE
@@ -79,7 +82,6 @@ def meaning(name: str, data: bytes) -> FrameType:
 )
 def test_the_numbers_of_the_manuals(name: str, data: bytes, value: float, quality: Quality) -> None:
     found = heard(name, data)
-    assert found is not None
     assert found.value == pytest.approx(value, rel=1e-12, abs=1e-12)
     assert found.quality == quality
 
@@ -108,7 +110,6 @@ def test_the_numbers_of_the_manuals(name: str, data: bytes, value: float, qualit
 )
 def test_what_is_no_measurement_is_not_a_number(name: str, data: bytes, quality: Quality) -> None:
     found = heard(name, data)
-    assert found is not None
     assert math.isnan(found.value)
     assert math.isnan(found.gross)
     assert quality in found.quality
@@ -181,10 +182,8 @@ def test_a_frame_of_another_address_is_not_taken() -> None:
 
 def test_gross_and_net_are_kept_apart() -> None:
     found = heard("laumas-tlb-ascii", b"&N000100L000250\\04\r")
-    assert found is not None
     assert (found.value, found.gross) == (1.0, 2.5)
     net = heard("and-ad-4406", b"ST,NT,+0012.34kg\r\n")
-    assert net is not None
     assert net.net is True
 
 
@@ -195,7 +194,6 @@ def test_mantracourt_says_by_a_bit_that_its_value_is_old() -> None:
     parser.begin()
     old, new, over = parser.feed(b"8192\r0\r512\r")
     assert old.frame.meaning is FrameType.STATUS
-    assert old.frame.decoded is not None
     assert new.frame.decoded is not None
     assert over.frame.decoded is not None
     assert Quality.STALE in old.frame.decoded.quality
@@ -216,10 +214,8 @@ def test_check_sums_by_hand(kind: object, expected: int) -> None:
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_example_of_every_device_file_is_read(name: str) -> None:
     spec = device(name).stream
-    assert spec is not None
     raw = bytes.fromhex(spec.example) if spec.binary else spec.example.encode("latin-1")
     found = heard(name, raw + spec.terminator.encode("latin-1"))
-    assert found is not None
     assert math.isfinite(found.value)
 
 
@@ -233,7 +229,6 @@ def test_every_device_says_where_its_numbers_come_from(name: str) -> None:
 
 def test_the_tare_of_a_net_value_gives_the_gross_one() -> None:
     found = heard("toledo-continuous", b"\x02\x2b\x33\x20000020000300\r")
-    assert found is not None
     assert found.net
     assert found.value == pytest.approx(-2.0 * G)
     assert found.gross == pytest.approx(28.0 * G)
@@ -254,6 +249,34 @@ def test_a_status_word_that_is_not_declared_gives_no_number(frame: bytes) -> Non
 
 def test_out_of_range_is_no_number() -> None:
     found = heard("toledo-continuous", b"\x02\x2b\x34\x20000123000000\r")
-    assert found is not None
     assert math.isnan(found.value)
     assert found.quality == Quality.OVERLOAD
+
+
+PAGE = (Path(__file__).parents[3] / "docs/howto/serial-instrument.md").read_text(encoding="utf-8")
+
+
+def test_the_line_of_your_own_is_read(tmp_path: Path) -> None:
+    blocks = re.findall(r"^```toml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    (text,) = [block for block in blocks if 'name = "my-cell"' in block]
+    path = tmp_path / "device.toml"
+    path.write_text(text, encoding="utf-8")
+    parser = StreamParser(read_device(path))
+    parser.begin()
+    good, moving, over = parser.feed(
+        b"scale: 12.34 kg, ok\nscale: -0.5 kg, moving\nscale: 412.34 kg, over\nscale: 1 lb, ok\n"
+    )
+    assert moving.frame.decoded is not None
+    assert over.frame.decoded is not None
+    assert good.frame.decoded.value == pytest.approx(12.34 * 9.80665)
+    assert moving.frame.decoded.quality == Quality.UNSTABLE
+    assert over.frame.decoded.quality == Quality.OVERLOAD
+    assert parser.counts.malformed == 1
+
+
+def test_the_table_has_every_device_and_how_it_speaks() -> None:
+    rows = dict(re.findall(r"^\| (`.+?`) \|.+\| (continuous|polled)", PAGE, re.MULTILINE))
+    said = {name: how for names, how in rows.items() for name in re.findall(r"`(.+?)`", names)}
+    assert said == {
+        name: "continuous" if stream(name).mode == "continuous" else "polled" for name in DEVICES
+    }

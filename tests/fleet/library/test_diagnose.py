@@ -23,7 +23,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line import invoke
+from command_line import done
 from winchkit import FileError, open_writer, write_run
 from winchkit.errors import ConnectionLost
 from winchkit.fleet import diagnose_library, index_library
@@ -125,8 +125,7 @@ def test_the_list_of_a_library_has_the_verdict_of_every_run(
     library: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def listed() -> list[str]:
-        result = invoke("library", "list", library)
-        assert result.exit_code == 0, result.output
+        result = done("library", "list", library)
         return result.stdout.splitlines()
 
     assert not any("explained" in line for line in listed())

@@ -15,7 +15,7 @@ from click.testing import Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from command_line import invoke
+from command_line import done
 from winchkit import write_run
 from winchkit.catalog import find
 from winchkit.effects.term import Term
@@ -92,8 +92,8 @@ def test_a_fleet_without_changes_has_none() -> None:
     assert history_text(fleet_history(known)).startswith("No change over time")
 
 
-def run(*arguments: object) -> Result:
-    return invoke("fleet", "trend", *arguments)
+def run(*arguments: object, code: int = 0) -> Result:
+    return done("fleet", "trend", *arguments, code=code)
 
 
 def test_a_step_is_found_and_dated_on_the_command_line(tmp_path: Path) -> None:
@@ -116,8 +116,7 @@ def test_a_step_is_found_and_dated_on_the_command_line(tmp_path: Path) -> None:
     index_library(library)
     profile = tmp_path / "elbow.toml"
     profile.write_text('schema = 1\nkind = "axis"\n')
-    result = run(library, "-p", profile, "--effect", "motor-viscous", "--json")
-    assert result.exit_code == 1, result.output
+    result = run(library, "-p", profile, "--effect", "motor-viscous", "--json", code=1)
     found = json.loads(result.stdout)
     assert (found["effects"], found["sessions"]) == (["motor-viscous"], 12)
     (parameter,) = found["parameters"]
@@ -192,8 +191,7 @@ def test_a_folder_of_profiles_shows_which_were_exchanged_and_a_trend_its_limit(
     page = tmp_path / "page.html"
     wanted = (small, "-p", small / "profiles", *FOLLOWED)
     limit = ("--limit", "cell-gain.gain_error=2 %")
-    result = run(*wanted, *limit, "--html", page)
-    assert result.exit_code == 1, result.output
+    result = run(*wanted, *limit, "--html", page, code=1)
     text = " ".join(result.stdout.split())
     assert "winches W1 and W4 have exchanged profiles: W1 fits that of W4" in text
     assert "winch W2: the span of the load cell is wrong" in text
@@ -207,7 +205,7 @@ def test_a_folder_of_profiles_shows_which_were_exchanged_and_a_trend_its_limit(
 
 @pytest.mark.usefixtures("fits")
 def test_one_profile_of_all_winches_cannot_be_exchanged(small: Path) -> None:
-    result = run(small, "-p", small / "profiles" / "W0.toml", *FOLLOWED, "--json")
+    result = run(small, "-p", small / "profiles" / "W0.toml", *FOLLOWED, "--json", code=1)
     found = json.loads(result.stdout)
     assert (found["sessions"], found["swapped"], found["failures"]) == (48, [], {})
 
@@ -216,7 +214,7 @@ def test_one_profile_of_all_winches_cannot_be_exchanged(small: Path) -> None:
 def test_a_winch_without_a_profile_costs_its_sessions_only(small: Path, tmp_path: Path) -> None:
     shutil.copytree(small / "profiles", tmp_path / "own")
     (tmp_path / "own" / "W3.toml").unlink()
-    result = run(small, "-p", tmp_path / "own", *FOLLOWED, "--json")
+    result = run(small, "-p", tmp_path / "own", *FOLLOWED, "--json", code=1)
     found = json.loads(result.stdout)
     assert (found["sessions"], len(found["failures"])) == (42, 6)
     assert "W3.toml" in found["failures"][f"W3 {START.date()}"]
@@ -235,17 +233,14 @@ def test_a_winch_without_a_profile_costs_its_sessions_only(small: Path, tmp_path
     ],
 )
 def test_wrong_input(small: Path, arguments: list[str], code: int, words: str) -> None:
-    result = run(small, "-p", find("profiles", "bench-spiral"), *arguments)
-    assert result.exit_code == code, result.output
+    result = run(small, "-p", find("profiles", "bench-spiral"), *arguments, code=code)
     assert words in result.stderr
 
 
 def test_a_folder_without_an_index_is_refused(tmp_path: Path) -> None:
     wanted = ("-p", "bench-spiral", "--effect", "cell-gain")
-    result = run(tmp_path, *wanted)
-    assert result.exit_code == 3
+    result = run(tmp_path, *wanted, code=3)
     assert "winchkit library index" in result.stderr
-    result = run(tmp_path / "nowhere", *wanted)
-    assert result.exit_code == 3
+    result = run(tmp_path / "nowhere", *wanted, code=3)
     assert "no such folder" in result.stderr
     assert "library index" not in result.stderr

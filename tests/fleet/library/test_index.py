@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from waiting import run_together
 from winchkit import FileError, UsageError, open_writer, write_run
 from winchkit.fleet import index_library, library_runs, query_library
 from winchkit.fleet.library.index import IndexReport
@@ -185,10 +186,7 @@ def test_two_writers_at_once_give_every_run_once(library: Path) -> None:
     threads = [
         threading.Thread(target=lambda: reports.append(index_library(library))) for _ in range(2)
     ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert sorted(len(report.indexed) for report in reports) == [0, 3]
     assert len(paths(library)) == 3
 

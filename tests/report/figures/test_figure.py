@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from figure_drawn import across, down, drawn, polylines
+from report_answers import AT_NOISE, ELASTIC, FRICTIONAL, NOISY, diagnosis_of
 from report_parsed import HOSTILE, Page
+from winchkit.fleet.report.comparison import shared_effects_html
 from winchkit.report.figures.export import png, write_figures
 from winchkit.report.figures.figure import (
     Figure,
@@ -21,10 +24,14 @@ from winchkit.report.figures.figure import (
     Panel,
     RunMark,
 )
+from winchkit.report.figures.ladder import error_ladder, fleet_ladders
 from winchkit.report.figures.layout import NARROW, WIDE, density_levels, scene_of, signed_levels
+from winchkit.report.figures.reduction import bin_means, decimated, filled_edges
 from winchkit.report.figures.tokens import DARK, LIGHT, STYLES, style_sheet
 from winchkit.report.html.page import figure_block
 from winchkit.report.html.svg import file_svg
+from winchkit.report.words.headline import worst_outputs
+from winchkit.report.words.sentence import headline
 
 
 def over_time(seed: int, count: int, size: float, gap: bool = False) -> Figure:
@@ -213,3 +220,112 @@ def test_colours_are_distinct_in_luminance_and_all_declared() -> None:
     used = {t for s in STYLES.values() for t in (s.stroke, s.fill) if t}
     assert used <= LIGHT.keys()
     assert all(f".f-{name}{{" in style_sheet() for name in STYLES)
+
+
+OUTPUTS = {"tension": AT_NOISE, "cable_length": NOISY, "motor_torque": FRICTIONAL}
+
+
+def test_the_ladder_has_the_ratios_and_the_worst_first() -> None:
+    ladder = error_ladder(OUTPUTS, extended=True, changed="with x")
+    rows = list(csv.DictReader(io.StringIO(ladder.table().csv())))
+    assert [row["output"] for row in rows] == ["motor torque", "cable length", "tension"]
+    for row, output in zip(rows, (FRICTIONAL, NOISY, AT_NOISE), strict=True):
+        noise = output.noise_rms
+        assert noise is not None
+        for column, error in (
+            ("error ÷ noise, today", output.heldout_rms_before),
+            ("error ÷ noise, with x", output.heldout_rms_after),
+        ):
+            assert float(row[column]) == pytest.approx(error / noise, rel=1e-6)
+
+
+def test_without_noise_there_is_no_ladder_and_errors_are_compared_with_signals() -> None:
+    outputs = {name: replace(one, noise_rms=None) for name, one in OUTPUTS.items()}
+    assert error_ladder(outputs) is None
+    assert worst_outputs(outputs)[0] == "motor_torque"
+
+
+def test_the_page_over_all_winches_draws_each_and_keeps_names_as_text() -> None:
+    found = {"A": diagnosis_of("explained", ELASTIC), HOSTILE: diagnosis_of("adequate")}
+    pages = dict.fromkeys(found, "own.html")
+    page = Page(shared_effects_html(found, [], {}, "x", pages))
+    assert set(page.shown) == page.figures.keys() == {"errors-cable_length", "errors-tension"}
+    assert page.figures["errors-cable_length"]["words"] == ["A", HOSTILE]
+    assert page.count("img") == 0
+    assert page.count("script") == 2
+    (first, second) = page.figures["errors-cable_length"]["columns"][2]
+    assert first == pytest.approx(0.36 / 0.30)
+    assert second is None, "no effect was named there"
+    assert next(f.id for f in fleet_ladders(found)) == "errors-cable_length"
+
+
+def test_headlines_are_short() -> None:
+    assert headline(diagnosis_of("explained", ELASTIC)) == "The cable is elastic"
+    assert headline(diagnosis_of("adequate")) == "No effect is missing"
+    assert headline(diagnosis_of("unknown")) == "No known effect explains the cable length error"
+    two = headline(diagnosis_of("explained", ELASTIC, ELASTIC))
+    assert two == "2 effects are missing; first, the cable is elastic"
+
+
+@given(st.integers(1, 5000), st.integers(5, 100), st.integers(0, 2**32 - 1))
+def test_every_extreme_stays_and_the_length_is_kept(count: int, intervals: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    series = [random.normal(size=count), random.standard_cauchy(size=count)]
+    series[1][random.uniform(size=count) < 0.1] = np.nan
+    rows = decimated(series, intervals)
+    assert len(rows) <= max(count if count <= 4 * intervals else 0, 4 * intervals + 2)
+    assert np.all(np.diff(rows) > 0)
+    assert (rows[0], rows[-1]) == (0, count - 1)
+    for values in series:
+        if np.isfinite(values).any():
+            assert np.nanmin(values[rows]) == np.nanmin(values)
+            assert np.nanmax(values[rows]) == np.nanmax(values)
+
+
+@given(st.integers(200, 5000), st.integers(0, 2**32 - 1))
+def test_the_extremes_of_every_interval_stay(count: int, seed: int) -> None:
+    values = np.random.default_rng(seed).normal(size=count)
+    kept = np.isin(np.arange(count), decimated([values], 20))
+    for part, there in zip(
+        np.split(values, np.linspace(0, count, 21).astype(int)[1:-1]),
+        np.split(kept, np.linspace(0, count, 21).astype(int)[1:-1]),
+        strict=True,
+    ):
+        assert {part.min(), part.max()} <= set(part[there])
+
+
+def test_a_gap_stays_a_gap() -> None:
+    values = np.ones(1000)
+    values[400:600] = np.nan
+    short = values[decimated([values], 50)]
+    assert np.count_nonzero(np.isnan(short)) == pytest.approx(10, abs=2)
+
+
+def test_a_single_spike_is_drawn() -> None:
+    values = np.zeros(100_000)
+    values[54_321] = 7.0
+    rows = decimated([values], 1000)
+    assert 54_321 in rows
+    assert len(rows) <= 2002
+
+
+def test_bins_recover_a_line_through_noise() -> None:
+    random = np.random.default_rng(1)
+    x = random.uniform(0, 10, 20_000)
+    y = 3 * x - 1 + random.normal(size=len(x))
+    centres, (means,) = bin_means(x, [y], filled_edges(x, 20))
+    assert len(centres) == 20
+    assert means == pytest.approx(3 * centres - 1, abs=0.15)
+
+
+def test_few_values_are_bins_of_their_own() -> None:
+    x = np.array([-1.0, 0.0, 1.0, 1.0, -1.0])
+    centres, (means,) = bin_means(x, [10 * x + 1], filled_edges(x, 20))
+    assert centres.tolist() == [-1.0, 0.0, 1.0]
+    assert means.tolist() == [-9.0, 1.0, 11.0]
+
+
+def test_empty_bins_are_left_out() -> None:
+    x = np.array([1.0, 2.0, 355.0])
+    centres, _ = bin_means(x, [x], np.linspace(0, 360, 37)[1:-1])
+    assert centres == pytest.approx([1.5, 355.0])

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
-from html.parser import HTMLParser
 from typing import Any
 
 import pytest
 
 from calibration_cases import held, measured, robot, rows
+from command_line import own_process
 from report_answers import answer_of, recorded
+from report_parsed import Page
 from robot_poses.truth import csv
 from winchkit.catalog import find
 from winchkit.diagnosis.add import add
@@ -44,31 +44,8 @@ NAMES = ("run", "profile", "robot", "comparison", "answer", "diagnosis", "fit", 
          "calibration")  # fmt: skip
 
 
-class _Balance(HTMLParser):
-    """Checks that every element is closed, and collects the text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text = ""
-        self.seen: set[str] = set()
-
-    def handle_starttag(self, tag: str, attrs: object) -> None:
-        self.open.append(tag)
-        self.seen.add(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
-
-
-def read(html: str) -> _Balance:
-    found = _Balance()
-    found.feed(html)
-    assert found.open == []
-    return found
+def tags(html: str) -> set[str]:
+    return {tag for tag, _ in Page(html).elements}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -83,17 +60,16 @@ def test_a_cell_of_a_notebook_is_whole_and_needs_no_script(
     name: str, results: dict[str, Any]
 ) -> None:
     html = results[name]._repr_html_()
-    found = read(html)
     assert len(html) < 60_000
-    assert not {"script", "style", "link", "img"} & found.seen
+    assert not {"script", "style", "link", "img"} & tags(html)
 
 
 def test_a_run_shows_its_channels_with_their_ranges(results: dict[str, Any]) -> None:
     run = results["run"]
-    for text in (repr(run), read(run._repr_html_()).text):
+    for text in (repr(run), Page(run._repr_html_()).text):
         assert f"{run['tension'].max():.1f}" in text
         assert "load_mass = 10 kg" in text
-    assert read(run._repr_html_()).seen >= {"table", "svg"}
+    assert tags(run._repr_html_()) >= {"table", "svg"}
 
 
 def test_a_profile_shows_what_its_file_declares(results: dict[str, Any]) -> None:
@@ -110,7 +86,7 @@ def test_a_profile_shows_what_its_file_declares(results: dict[str, Any]) -> None
 def test_a_diagnosis_shows_its_verdict_the_value_and_the_errors(results: dict[str, Any]) -> None:
     diagnosis = results["diagnosis"]
     radius = diagnosis.steps[0].parameters["drum-radius"]["radius_error"]
-    cell = read(diagnosis._repr_html_()).text.replace("\u00a0", " ")
+    cell = Page(diagnosis._repr_html_()).text
     for text in (repr(diagnosis), cell):
         assert "explained" in text.lower()
         assert f"radius error = {radius.value * 1e3:.4f}" in text
@@ -125,7 +101,7 @@ def test_text_in_a_name_is_no_markup(results: dict[str, Any]) -> None:
     from dataclasses import replace
 
     run = replace(results["run"], name="<script>alert(1)</script>")
-    assert "script" not in read(run._repr_html_()).seen
+    assert "script" not in tags(run._repr_html_())
 
 
 def test_a_type_without_renderer_has_the_representation_of_an_object() -> None:
@@ -143,5 +119,5 @@ def test_the_report_is_loaded_when_a_result_is_shown_and_not_before() -> None:
         "run = Run('a', np.arange(2.0), {})\nprint('winchkit.report' in sys.modules)\n"
         "repr(run)\nprint('winchkit.report' in sys.modules, 'matplotlib' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = own_process(sys.executable, "-c", code)
     assert done.stdout.split() == ["False", "True", "False"]

@@ -171,7 +171,6 @@ def test_a_stretch_is_drawn_over_the_load() -> None:
     answer = answer_of("demo-elastic-rope")
     figures = residual_figures(residuals_of(answer))
     over = {p.output: p.over_variable for p in figures}["cable_length"]
-    assert over is not None
     assert over.x.label == "load [N]"
     slopes = []
     for one in over.panels[0].series:
@@ -186,7 +185,6 @@ def test_a_stretch_is_drawn_over_the_load() -> None:
 def test_five_corners_are_drawn_within_a_turn() -> None:
     figures = residual_figures(residuals_of(answer_of("five-cornered-drum")))
     over = {p.output: p.over_variable for p in figures}["tension"]
-    assert over is not None
     mean = next(one for one in over.panels[0].series if one.mark == "mean")
     angle = np.radians(mean.x)
     power = [abs(np.mean(mean.y * np.exp(-1j * order * angle))) for order in range(1, 9)]

@@ -1,4 +1,4 @@
-"""The verdict in words, for every kind of verdict."""
+"""The verdict in words, for every kind of verdict, and the words of caveats and columns."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ from report_answers import (
     REFITTED,
     diagnosis_of,
 )
-from winchkit.diagnosis.results import Attribution, Estimate, NextRun, Step
+from winchkit.diagnosis.results import Attribution, Estimate, NextRun, OutputFit, Step
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.fit_statistics import FitStatistics, FittedParameter
+from winchkit.quantity_text import significant
+from winchkit.report.words.caveats import caveat_text, finding_texts
+from winchkit.report.words.effect_names import EFFECTS
 from winchkit.report.words.sentence import (
     changes_text,
     headline,
@@ -28,7 +31,7 @@ from winchkit.report.words.sentence import (
     sentence,
     where_text,
 )
-from winchkit.report.words.vocabulary import clause, estimate_text, kind, listed
+from winchkit.report.words.vocabulary import clause, error_scale, estimate_text, kind, listed
 from winchkit.runs.sanity.finding import Finding
 
 
@@ -299,3 +302,54 @@ def test_steps_beside_an_output_that_does_not_follow_the_motion_do_not_hide_it()
     assert headline(diagnosis_of("unknown", ELASTIC, sanity=(lost,))) == (
         "The tension does not follow the motion"
     )
+
+
+def test_every_effect_of_the_catalogue_has_words() -> None:
+    assert not [one.id for one in load_catalogue() if one.id not in EFFECTS]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [(1.84, 7e-4, "1840 0.700 mm"), (3.93e-3, 3.16e-4, "3.93 0.316 mm"), (0.0, 0.0, "0 0 m")],
+)
+def test_both_errors_of_an_output_are_readable_in_one_unit(
+    before: float, after: float, text: str
+) -> None:
+    fit = OutputFit("m", None, 1.0, before, after, before, after, None)
+    scale = error_scale(fit)
+    assert f"{significant(before / scale.worth)} {scale.text(after)}" == text
+
+
+def jitter(run: str, share: int) -> Finding:
+    return Finding("jitter", run, "time", share / 100, f"intervals vary by {share} %")
+
+
+def test_equal_findings_of_several_runs_are_one_line() -> None:
+    found = [jitter("a", 50), jitter("b", 50), jitter("c", 20)]
+    assert finding_texts(found) == [
+        "time of a, b: intervals vary by 50 %",
+        "time of c: intervals vary by 20 %",
+    ]
+
+
+def test_alike_findings_of_many_runs_are_shortened() -> None:
+    found = [jitter(f"run-{number}", 40 + number) for number in range(14)]
+    others = [Finding("gap", "run-0", "time", 1.0, "1 gap")]
+    assert finding_texts([*found, *others]) == [
+        "time of run-0: intervals vary by 40 %",
+        "time of run-1: intervals vary by 41 %",
+        "time of run-2: intervals vary by 42 %",
+        "time of 11 runs, run-3 to run-13: the same with other numbers, listed by --json",
+        "time of run-0: 1 gap",
+    ]
+
+
+def test_the_short_text_has_one_line_per_kind_of_finding() -> None:
+    assert finding_texts([jitter("a", 50), jitter("b", 20), jitter("c", 30)], most=1) == [
+        "time of a: intervals vary by 50 %",
+        "time of b, c: the same with other numbers, listed by --json",
+    ]
+
+
+def test_an_inverted_sign_says_what_to_do() -> None:
+    assert "--column CHANNEL=-COLUMN" in caveat_text("inverted-sign")

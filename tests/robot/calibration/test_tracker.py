@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from calibration_cases import EXACT, measured, robot, rows
-from model_files import answer, invoke
+from command_line import invoke
+from model_files import answer
 from robot_poses.station import Station, about
 from robot_poses.truth import csv
 from winchkit.catalog import find

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from model_files import answer, invoke
+from command_line import invoke
+from model_files import answer
 from robot_poses.cases import CASES
 from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import HOME, turn

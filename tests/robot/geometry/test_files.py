@@ -10,7 +10,7 @@ import pytest
 from click.testing import Result
 from scipy.spatial.transform import Rotation
 
-from model_files import invoke
+from command_line import invoke
 from robot_cases import shipped
 from winchkit.arrays import Array
 from winchkit.errors import FileError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import invoke
+from command_line import done, invoke
 from winchkit.errors import RunError
 from winchkit.runs import open_writer, read_run
 from winchkit.runs.recover import recover
@@ -56,8 +56,7 @@ def test_check_warns_of_a_cut_log_and_names_what_helps(log: Path) -> None:
     data = log.read_bytes()
     assert data.endswith(b",20.0\n")
     log.write_bytes(data[: -len("0.0\n")])
-    result = invoke("check", log)
-    assert result.exit_code == 0
+    result = done("check", log)
     assert "7 rows" in result.stdout
     assert f"`winchkit log recover {log}`" in result.stderr
     assert "(warning)" in result.stderr

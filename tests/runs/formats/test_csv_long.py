@@ -91,7 +91,6 @@ def test_numbers_are_read_as_python_reads_them(
 ) -> None:
     texts = [repr(value) if form == "r" else format(value, form) for value in values]
     read = _plain([f"{text},1\n" for text in texts], 2, parser)
-    assert read is not None
     np.testing.assert_array_equal(read[0], [float(text) for text in texts])
 
 

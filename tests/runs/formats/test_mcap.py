@@ -68,7 +68,6 @@ def test_another_reader_finds_rows_units_and_metadata(tmp_path: Path) -> None:
         found = list(reader.iter_messages())
         records = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
     schema, channel, message = found[3]
-    assert schema is not None
     assert (schema.encoding, channel.message_encoding, channel.topic) == (
         "jsonschema",
         "json",

@@ -113,43 +113,34 @@ def test_unit_of_a_header_cell(text: str, name: str, unit: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "channel"),
+    ("channel", "names"),
     [
-        ("Winkel_ist", "motor_angle"),
-        ("Drehzahl", "motor_velocity"),
-        ("Istdrehmoment", "motor_torque"),
-        ("Seilkraft", "tension"),
-        ("Seillänge", "cable_length"),
-        ("Zeit", "time"),
-        ("couple", "motor_torque"),
-        ("vitesse", "motor_velocity"),
-        ("fuerza", "tension"),
-        ("velocidad", "motor_velocity"),
-        ("tiempo", "time"),
-        ("LoadCell", "tension"),
-        ("eff_j1", "motor_torque"),
-        ("eff_left_knee", "motor_torque"),
-        ("Cell temperature", "temperature"),
-        ("Position demand value", ""),
-        ("Sollwinkel", "motor_angle"),
-        ("Winkel Soll", ""),
-        ("Following error actual value", ""),
+        ("motor_angle", "Winkel_ist, theta, Mot_pos, CurrentEncoderReading, Current Position"),
+        ("motor_velocity", "Drehzahl, vitesse, velocidad, theta_dot, q_dot, phi dot"),
+        ("motor_torque", "Istdrehmoment, couple, tau_meas, eff_j1, eff_left_knee"),
+        ("tension", "Seilkraft, fuerza, LoadCell, current load"),
+        ("cable_length", "Seillänge"),
+        ("time", "Zeit, tiempo, st_out.t, log/time, run.data.Zeit"),
+        ("temperature", "Cell temperature"),
+        ("current", "Motor current, Current"),
         ("A.motor_angle", "A.motor_angle"),
+        ("platform_x", "pose.position.x, linear_position.x"),
+        ("platform_y", "position.y"),
+        ("platform_z", "transform.translation.z"),
+        ("platform_qx", "pose.orientation.x"),
+        # Set points, predictions, second derivatives and components of a motion.
+        ("", "Position demand value, Sollwinkel, Winkel Soll, Following error actual value"),
+        ("", "tau_model, torque_predicted, theta_ddot, q_ddot"),
+        ("", "linear_acceleration.x, linear.y, angular.z, angular_velocity.x, twist.linear.x"),
+        ("", "magnetic_field.z, imu acc x, gyro_z"),
+        # An efficiency is no effort.
+        (None, "eff, eff_mech, efficiency 2, motor_eff"),
     ],
 )
-def test_names_in_several_languages(name: str, channel: str) -> None:
-    meaning = meaning_of(name)
-    if name == "Sollwinkel":  # a set point in one word
-        assert meaning is None or meaning.channel == ""
-        return
-    assert meaning is not None
-    assert meaning.channel == channel
-
-
-@pytest.mark.parametrize("name", ["eff", "eff_mech", "efficiency 2", "motor_eff"])
-def test_an_efficiency_is_no_effort(name: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is None or meaning.channel != "motor_torque"
+def test_names_of_channels(channel: str | None, names: str) -> None:
+    for name in names.split(", "):
+        meaning = meaning_of(name)
+        assert (None if meaning is None else meaning.channel) == channel, name
 
 
 @pytest.mark.parametrize(
@@ -273,29 +264,6 @@ def test_short_names_of_a_current_and_a_set_point(tmp_path: Path) -> None:
     found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=0.1))
     assert of(found, "motor_velocity").source == "vel"
     assert of(found, "motor_torque").factor == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize(
-    ("name", "channel"),
-    [("theta_dot", "motor_velocity"), ("q_dot", "motor_velocity"), ("phi dot", "motor_velocity"),
-     ("theta_ddot", ""), ("q_ddot", ""), ("theta", "motor_angle"), ("Mot_pos", "motor_angle"),
-     ("tau_model", ""), ("torque_predicted", ""), ("tau_meas", "motor_torque")],
-)  # fmt: skip
-def test_derivatives_by_their_dots_and_predictions(name: str, channel: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is not None
-    assert (meaning.channel, meaning.rank) == (channel, 1)
-
-
-@pytest.mark.parametrize(
-    ("name", "channel"),
-    [("CurrentEncoderReading", "motor_angle"), ("Current Position", "motor_angle"),
-     ("current load", "tension"), ("Motor current", "current"), ("Current", "current")],
-)  # fmt: skip
-def test_current_is_an_ampere_or_the_present_value(name: str, channel: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is not None
-    assert meaning.channel == channel
 
 
 def test_a_time_of_which_no_channel_is_used_is_not_asked(tmp_path: Path) -> None:
@@ -544,13 +512,6 @@ def test_two_columns_that_increase_evenly_are_no_clock(tmp_path: Path) -> None:
     assert any("no column is time" in question.text for question in found.questions)
 
 
-@pytest.mark.parametrize("name", ["st_out.t", "log/time", "run.data.Zeit"])
-def test_the_last_part_of_a_name_counts_where_the_whole_says_nothing(name: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is not None
-    assert meaning.channel == "time"
-
-
 def joints(gain: float = 1.0) -> dict[str, np.ndarray]:
     """Three joints of one robot: the first moves, the second follows it, the third is locked."""
     m = motion()
@@ -727,29 +688,6 @@ def test_a_vector_of_few_values_beside_a_recording_is_a_parameter(tmp_path: Path
     found = guess_columns(read_table(path))
     assert of(found, "motor_angle").source == "position"
     assert "parameter" in next(a.reason for a in found.assignments if a.source == "q")
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["linear_acceleration.x", "linear.y", "angular.z", "angular_velocity.x",
-     "twist.linear.x", "magnetic_field.z", "imu acc x", "gyro_z"],
-)  # fmt: skip
-def test_components_of_motion_are_no_position(name: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is not None
-    assert meaning.channel == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "channel"),
-    [("pose.position.x", "platform_x"), ("transform.translation.z", "platform_z"),
-     ("pose.orientation.x", "platform_qx"), ("position.y", "platform_y"),
-     ("linear_position.x", "platform_x")],
-)  # fmt: skip
-def test_components_of_a_pose_are_its_position(name: str, channel: str) -> None:
-    meaning = meaning_of(name)
-    assert meaning is not None
-    assert meaning.channel == channel
 
 
 @pytest.mark.parametrize(

@@ -28,8 +28,6 @@ def test_another_reader_finds_every_sample_with_its_own_time(tmp_path: Path) -> 
         found = list(reader.iter_messages([DRIVE]))
         readings = list(reader.iter_messages([CELL]))
         records = {item.name: dict(item.metadata) for item in reader.iter_metadata()}
-    assert summary is not None
-    assert summary.statistics is not None
     assert summary.statistics.chunk_count == len(summary.chunk_indexes) == 21
     assert len(found) == len(given[DRIVE])
     stamps = np.array([message.log_time for _, _, message in found])
@@ -40,7 +38,6 @@ def test_another_reader_finds_every_sample_with_its_own_time(tmp_path: Path) -> 
     assert arrived == pytest.approx(5e6, abs=256)
     assert [message.sequence for _, _, message in readings] == list(range(len(readings)))
     schema, channel, _ = readings[0]
-    assert schema is not None
     assert (schema.name, schema.encoding) == ("winchkit/msg/Cell", "ros2msg")
     assert schema.data.decode().splitlines()[0] == "float64 tension # N"
     assert (channel.topic, channel.message_encoding) == (CELL, "cdr")

@@ -1,7 +1,10 @@
-"""Logs in parts: each reads alone, together they read as one file would."""
+"""Logs on the disk: in parts that read as one file would, and synced from another thread."""
 
 from __future__ import annotations
 
+import errno
+import os
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +16,7 @@ from winchkit.runs import read_run
 from winchkit.runs.read import read_log
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation, part_path, parts_beside
+from winchkit.runs.recording.sync import SYNC_PERIOD, Syncer
 
 SECOND = Rotation(duration=1.05)
 
@@ -138,3 +142,52 @@ def test_recordings_of_one_time_are_no_parts_of_one_log(tmp_path: Path) -> None:
     written(tmp_path / "b.csv", 1.0)
     with pytest.raises(RunError, match=r"before .*a\.csv ends .*one by one"):
         read_log([tmp_path / "a.csv", tmp_path / "b.csv"])
+
+
+def test_the_promise_is_kept_by_the_period() -> None:
+    assert SYNC_PERIOD <= 1.0
+
+
+def test_every_file_is_synced_by_another_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[tuple[int, int]] = []
+    monkeypatch.setattr(
+        os, "fsync", lambda fd: synced.append((os.fstat(fd).st_ino, threading.get_ident()))
+    )
+    syncer = Syncer()
+    files = [(tmp_path / name).open("wb") for name in "ab"]
+    nodes = [os.fstat(file.fileno()).st_ino for file in files]
+    for file in files:
+        syncer.watch(file.fileno())
+        file.close()
+    syncer.close()
+    assert {node for node, _ in synced} == set(nodes)
+    assert threading.get_ident() not in {thread for _, thread in synced}
+    assert syncer.error is None
+
+
+@pytest.mark.parametrize(("number", "kept"), [(errno.EIO, True), (errno.EINVAL, False)])
+def test_an_input_output_error_is_kept_and_a_missing_fsync_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, kept: bool
+) -> None:
+    def fsync(_descriptor: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    syncer = Syncer()
+    with (tmp_path / "a").open("wb") as file:
+        syncer.watch(file.fileno())
+    syncer.close()
+    assert (syncer.error is not None) is kept
+
+
+def test_no_descriptor_is_left_open(tmp_path: Path) -> None:
+    before = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
+    syncer = Syncer()
+    with (tmp_path / "a").open("wb") as file:
+        for _ in range(20):
+            syncer.watch(file.fileno())
+    syncer.close()
+    after = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
+    assert after == before

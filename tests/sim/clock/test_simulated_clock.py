@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from waiting import run_together
 from winchkit import open_bench
 from winchkit.catalog import find
 from winchkit.errors import WinchkitError
@@ -41,10 +42,7 @@ def test_threads_run_one_at_a_time_in_the_order_of_their_events() -> None:
             inside.release()
 
     threads = [clock.thread(lambda n=n, p=p: work(n, p), n) for n, p in (("a", 0.3), ("b", 0.2))]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     # By time; at 0.6 s "a" asked at 0.3 s for its wake-up and "b" at 0.4 s.
     assert seen == [
         (0.2, "b"),
@@ -119,10 +117,7 @@ def test_a_lock_may_be_held_while_its_holder_waits() -> None:
             seen.append(clock.now())
 
     threads = [clock.thread(work, str(k)) for k in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert [b - a for a, b in itertools.pairwise(seen)] == pytest.approx([1.0, 1.0])
 
 

@@ -6,7 +6,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,26 +14,22 @@ from pathlib import Path
 import can
 import pytest
 
+from command_line import own_process
+from sim_process import WINCHKIT, start
 from waiting import until
 from winchkit import open_bench
 from winchkit.schema.read import read_bench
 from winchkit.sim.live.client import address_file, send
 
-COMMAND = [sys.executable, "-c", "from winchkit.cli import main; main()", "sim", "serve"]
+COMMAND = [*WINCHKIT, "sim", "serve"]
 
 
 @contextmanager
 def serving(
     folder: Path, *options: str, bench: str = "spiral-bench"
 ) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(
-        [*COMMAND, bench, *options],
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    words = ("sim", "serve", bench, *options)
+    process = start(*words, stdin=subprocess.PIPE, folder=folder)
     try:
         yield process
     finally:
@@ -46,7 +41,6 @@ def wait_for_file(process: subprocess.Popen[str], path: Path) -> None:
     end = time.monotonic() + 60
     while not path.is_file():
         if process.poll() is not None:
-            assert process.stderr is not None
             words = process.stderr.read()
             if "multicast" in words:
                 pytest.skip(f"no multicast on this machine: {words}")
@@ -152,22 +146,13 @@ def test_of_two_onto_one_bench_file_the_second_is_refused(tmp_path: Path) -> Non
 
 
 def test_an_unknown_bench_is_a_clear_error(tmp_path: Path) -> None:
-    found = subprocess.run(
-        [*COMMAND, "spirl-bench"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert found.returncode == 3
+    found = own_process(*COMMAND, "spirl-bench", code=3, cwd=tmp_path)
     assert "did you mean 'spiral-bench'?" in found.stderr
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
 def test_a_folder_that_is_not_there_is_a_clear_error(tmp_path: Path) -> None:
-    found = subprocess.run(
-        [*COMMAND, "spiral-bench", "--interface", "virtual", "--bench-file", "no/where.toml"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert found.returncode == 3
+    words = ("spiral-bench", "--interface", "virtual", "--bench-file", "no/where.toml")
+    found = own_process(*COMMAND, *words, code=3, cwd=tmp_path)
     assert found.stderr.startswith(str(Path("no/where.toml")))

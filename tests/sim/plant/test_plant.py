@@ -1,19 +1,22 @@
-"""The plant as a whole: the nominal winch, virtual work, energy, the drive."""
+"""The plant: the nominal winch, virtual work, energy, the drive's loops, noise of the readings."""
 
 from dataclasses import replace
 from itertools import pairwise
 from math import pi
+from random import Random
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from plant_benches import GRAVITY, GROOVED, SPIRAL, cruise, hide, plant
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.simbench import HiddenSpec, WinchTruth
+from winchkit.schema.simbench import HiddenSpec, NoiseSpec, WinchTruth
 from winchkit.sim.plant.kinematics import Kinematics
 from winchkit.sim.plant.plant import WinchPlant
-from winchkit.sim.plant.servo import DriveCommand
+from winchkit.sim.plant.sensors import GaussianNoise, Measurement
+from winchkit.sim.plant.servo import DriveCommand, Servo
 from winchkit.sim.plant.trajectory import plan
 
 
@@ -211,3 +214,108 @@ def test_a_move_ends_where_it_should() -> None:
     rows = lift(winch, 2 * pi * 20)
     assert rows[-1]["motor_angle"] == pytest.approx(0.3 + 2 * pi * 20, abs=1e-4)
     assert winch.motor_velocity == pytest.approx(0.0, abs=1e-3)
+
+
+def test_two_lags_as_an_ode_solver_has_them() -> None:
+    goal, lag = 3.0, 0.004
+
+    def slopes(_: float, state: np.ndarray) -> list[float]:
+        return [(goal - state[0]) / lag, (state[0] - state[1]) / lag]
+
+    truth = solve_ivp(slopes, (0.0, 0.02), [0.0, -1.0], rtol=1e-10, atol=1e-12, dense_output=True)
+    servo, speed, time = Servo(), -1.0, 0.0
+    for dt in (0.001, 0.0003, 0.0007, 0.005, 0.00001, 0.012):
+        acceleration = servo.acceleration(
+            DriveCommand(speed=goal), angle=0.0, speed=speed, idle_torque=0.0, inertia=1.0, dt=dt
+        )
+        speed += dt * acceleration
+        time += dt
+        assert speed == pytest.approx(truth.sol(time)[1], abs=1e-8)
+
+
+@pytest.mark.parametrize("portions", [(1e-3,), (1e-3 / 3, 2e-3 / 3), (2e-3 / 3, 1e-3 / 3), (1e-4,)])
+def test_a_load_weighs_the_same_whatever_the_last_portion(portions: tuple[float, ...]) -> None:
+    """A cell that converts in step with the portions would else read another mass."""
+    winch, ramp, time = plant(SPIRAL, cable_length=3.0), 300.0, 0.0
+    slopes = []
+    while time < 0.3:
+        for dt in portions:
+            time += dt
+            winch.advance(dt, DriveCommand(speed=ramp * time))
+        slopes.append((winch.motor_velocity, winch.load / winch.load_mass - GRAVITY))
+    settled = np.array(slopes[len(slopes) // 2 :])
+    arm = settled[:, 1] / ramp
+    # The cable's acceleration is the arm times the ramp, within what the arm itself changes.
+    assert np.ptp(arm) < 0.01 * abs(arm.mean())
+    assert abs(arm.mean()) == pytest.approx(abs(_arm(winch)), rel=0.01)
+
+
+def _arm(winch: WinchPlant) -> float:
+    before = (winch.motor_angle, winch.cable_length)
+    winch.advance(0.01, DriveCommand(speed=90.0))
+    return float((winch.cable_length - before[1]) / (winch.motor_angle - before[0]))
+
+
+COUNT = 40_000
+
+
+def samples(colour: float, interval: float = 0.02) -> np.ndarray:
+    noise = GaussianNoise(2.0, colour, 0.5, Random(7))
+    return np.array([noise.sample(interval) for _ in range(COUNT)])
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.3, 1.0])
+def test_size_and_memory(colour: float) -> None:
+    x = samples(colour)
+    effective = COUNT / (1 + 2 * 25 * colour)
+    assert np.std(x) == pytest.approx(2.0, rel=4 / np.sqrt(effective))
+    assert abs(np.mean(x)) < 4 * 2.0 / np.sqrt(effective)
+    for lag in (1, 25, 60):
+        expected = colour * np.exp(-lag * 0.02 / 0.5)
+        found = np.corrcoef(x[:-lag], x[lag:])[0, 1]
+        assert found == pytest.approx(expected, abs=5 / np.sqrt(effective))
+
+
+def test_memory_counts_time_and_not_samples() -> None:
+    fast, slow = samples(1.0, 0.005), samples(1.0, 0.5)
+    assert np.corrcoef(fast[:-1], fast[1:])[0, 1] > 0.97
+    assert np.corrcoef(slow[:-1], slow[1:])[0, 1] == pytest.approx(np.exp(-1), abs=0.02)
+
+
+def readings(seed: int) -> list[Measurement]:
+    noise = NoiseSpec(3e-4, 0.8, 5e-3, 0.8, 0.05, 0.3, 0.5)
+    truth = WinchTruth(hidden=(hide("elastic rope"),))
+    winch = WinchPlant(GROOVED, truth, seed=seed, noise=noise)
+    out = []
+    for _ in range(500):
+        winch.advance(0.004, DriveCommand(speed=20.0))
+        out.append(winch.measure())
+    return out
+
+
+def test_a_seed_brings_everything_back() -> None:
+    assert readings(3) == readings(3)
+
+
+def test_seeds_and_instruments_differ() -> None:
+    one, other = readings(3), readings(4)
+    assert [m.motor_angle for m in one] == [m.motor_angle for m in other]
+    errors = {
+        (name, seed): np.array([getattr(m, name) for m in rows])
+        for seed, rows in ((3, one), (4, other))
+        for name in ("tension", "load", "cable_length", "motor_torque", "temperature")
+    }
+    differences = errors["tension", 3] - errors["tension", 4]
+    assert np.std(differences) == pytest.approx(0.8 * np.sqrt(2), rel=0.35)
+    load = errors["load", 3] - errors["load", 4]
+    assert abs(np.corrcoef(differences, load)[0, 1]) < 0.35
+
+
+def test_without_noise_the_instruments_measure_the_truth() -> None:
+    winch = WinchPlant(GROOVED, WinchTruth(), seed=1)
+    winch.advance(0.5, DriveCommand(speed=30.0))
+    read = winch.measure()
+    for name in ("motor_angle", "motor_velocity", "motor_torque", "tension", "load"):
+        assert getattr(read, name) == getattr(winch, name)
+    assert read.cable_length == winch.cable_length
+    assert read.temperature == winch.temperature == 20.0

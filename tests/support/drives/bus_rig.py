@@ -150,7 +150,6 @@ class RemoteDrive:
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def ask(*arguments: Any) -> Any:
-            assert self._process.stdin is not None
             self._process.stdin.write(json.dumps([name, *arguments]) + "\n")
             self._process.stdin.flush()
             return self._read()
@@ -158,7 +157,6 @@ class RemoteDrive:
         return ask
 
     def _read(self) -> Any:
-        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         assert line, "the drive's process has ended"
         return json.loads(line)

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from bare_winches import bare_winches
-from command_line import invoke
+from command_line import done
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
@@ -77,8 +77,7 @@ def served(folder: Path, winches: str = "A", *, paced: bool = False) -> Iterator
 def without_trip(bench: Served) -> Served:
     """The same bench, reset where a trip is latched."""
     if bench.file.with_suffix(".trip.json").exists():
-        cleared = invoke("reset", "-b", bench.file)
-        assert cleared.exit_code == 0, cleared.output
+        done("reset", "-b", bench.file)
     return bench
 
 

@@ -53,7 +53,6 @@ class DriveServer:
     def renew(self, device: str = "generic-cia402") -> None:
         """Put a new drive in the place of the old one; it is switched on."""
         declared = read_device(catalog.find("devices", device))
-        assert declared.servo is not None
         eds = Path(declared.path).parent / declared.servo.eds
         with self.lock:
             now = time.monotonic()

@@ -50,7 +50,6 @@ def generic(**servo: Any) -> DeviceSpec:
 
 
 def eds_of(spec: DeviceSpec) -> Path:
-    assert spec.servo is not None
     return Path(spec.path).parent / spec.servo.eds
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from command_line import invoke
+from command_line import done
 from winchkit.catalog import find
 from winchkit.runs import write_run
 from winchkit.runs.run import Channel, Run
@@ -49,8 +49,7 @@ SHIPPED = Path(__file__).parents[3] / "profiles" / "bench-spiral.toml"
 
 def answer(*arguments: object) -> dict[str, Any]:
     """What a command prints with --json: one line and nothing besides."""
-    result = invoke(*arguments, "--json")
-    assert result.exit_code == 0, result.stderr
+    result = done(*arguments, "--json")
     assert result.stdout.count("\n") == 1
     value = json.loads(result.stdout, parse_constant=_refused)
     assert isinstance(value, dict)

@@ -166,7 +166,7 @@ def _run(file: str) -> Verdict:
 
 
 def _eds(file: str) -> Verdict:
-    from winchkit.cli.files.check_eds import describe_eds, lines_of
+    from winchkit.cli.files.check_declaration import describe_eds, lines_of
 
     drive, warnings = describe_eds(Path(file))
     name = " ".join(filter(None, (drive.maker, drive.product)))

@@ -38,7 +38,7 @@ COMMANDS = {
         "winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."
     ),
     "recover": CommandPlace(
-        "winchkit.cli.log.recover", "Save what is whole of a log that was cut off."
+        "winchkit.cli.log.info", "Save what is whole of a log that was cut off.", "recover"
     ),
     "export": CommandPlace(
         "winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."

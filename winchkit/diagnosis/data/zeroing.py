@@ -39,7 +39,7 @@ _LEVEL_OF_WANDER = 0.01
 """Level of the test that the level of block means exceeds a random walk from zero; convention;
 simulated size at most 1.3 %, of white noise to a walk, 1 to 6 runs."""
 _AS_LARGE = 0.25
-"""Offset over the largest values of a force from which it is no wrong zero; rule of thumb."""
+"""Offset over the largest tension from which it is no zero of the cell; rule of thumb."""
 _REGION = 3.841
 """Increase of the restricted deviance up to which a ratio of variances is not rejected; theory: 95
 % quantile of χ²(1)."""
@@ -137,9 +137,10 @@ def no_zero(finding: Finding, rates: Sequence[Array], measured: Sequence[Array])
         return ""
     if is_setting(rates):
         return "the runs differ in speed or direction, on which friction depends"
-    usual = float(np.quantile(np.abs(np.concatenate(measured)), 0.95))
-    if finding.value > _AS_LARGE * usual:
-        return "that is a quarter of the largest values and more, as of another load"
+    if finding.channel == "tension":
+        usual = float(np.quantile(np.abs(np.concatenate(measured)), 0.95))
+        if finding.value > _AS_LARGE * usual:
+            return "that is a quarter of the largest values and more, as of another load"
     return ""
 
 

@@ -16,9 +16,8 @@ from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.device_command import confirm, permitted_command
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
-from winchkit.drivers.reading import Quality, Sensor
+from winchkit.drivers.reading import Quality, Sensor, StatusWord
 from winchkit.drivers.sharing import RETRY
-from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.units import convert, dimension_of

@@ -7,8 +7,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from winchkit.drivers.reading import Quality
-from winchkit.drivers.status_word import StatusWord
+from winchkit.drivers.reading import Quality, StatusWord
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.modbus import (

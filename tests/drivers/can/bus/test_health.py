@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drive_on_bus import DriveOnBus, bus_spec, device
-from waiting import until
+from waiting import run_together, until
 from winchkit.drivers.can.bus import bus as bus_module
 from winchkit.drivers.can.bus.bus import CanBus, FrameTime
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
@@ -460,10 +460,7 @@ def test_sending_from_several_threads_loses_nothing(
         threading.Thread(target=lambda n=n: [bus.send(0x200 + n, bytes((k,))) for k in range(200)])
         for n in range(4)
     ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     for number in range(4):
         data = [d[0] for i, d in interfaces[0].sent if i == 0x200 + number]
         assert data == list(range(200))

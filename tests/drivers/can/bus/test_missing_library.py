@@ -1,14 +1,16 @@
-"""An interface whose library is not installed: one sentence that names what to install."""
+"""Libraries of an interface: one that is not installed, and those that no process has to import."""
 
 from __future__ import annotations
 
 import importlib
 import pty
+import sys
 from os import ttyname
 
 import can.interfaces
 import pytest
 
+from command_line import own_process
 from winchkit.drivers.can.bus.interface import open_interface
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
@@ -64,3 +66,26 @@ def test_socketcand_without_its_daemon_in_the_bench_file() -> None:
 def test_an_empty_channel_is_a_fault_of_the_bench_file() -> None:
     empty = BusSpec("can", interface="serial", channel="")
     assert [key for key, _ in empty.rules()] == ["channel"]
+
+
+HEAVY = ("asammdf", "pandas", "canmatrix", "openpyxl")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "module", ["winchkit.drivers.can.bus.bus", "winchkit.sim.live.bench", "winchkit.bench.open"]
+)
+def test_a_bus_imports_no_package_of_mf4(module: str) -> None:
+    code = (
+        f"import sys, {module}; assert 'can' in sys.modules; print({set(HEAVY)} & set(sys.modules))"
+    )
+    done = own_process(sys.executable, "-c", code)
+    assert done.stdout.strip() == "set()"
+
+
+@pytest.mark.slow
+def test_asammdf_can_be_imported_afterwards() -> None:
+    pytest.importorskip("asammdf")
+    code = "import winchkit.drivers.can.bus.bus, asammdf; print(asammdf.MDF.__name__)"
+    done = own_process(sys.executable, "-c", code)
+    assert done.stdout.strip() == "MDF"

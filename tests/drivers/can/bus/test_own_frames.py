@@ -1,7 +1,8 @@
-"""No frame of this bench is taken for somebody else's, whatever an interface hands back."""
+"""Frames seen on a bus: for somebody who watches, and never taken for somebody else's."""
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import Any
@@ -10,8 +11,9 @@ import can
 import pytest
 
 from sim_process import free_port
-from waiting import until
+from waiting import run_together, until
 from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.interface import _Library
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.bench import BusSpec
@@ -46,10 +48,7 @@ def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None
                 time.sleep(0.001)
 
         threads = [threading.Thread(target=run, args=(send,)) for send in sends]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
+        run_together(threads)
         stranger.send(can.Message(arbitration_id=_RPDO, data=b"\x06\0", is_extended_id=False))
         stranger.send(can.Message(arbitration_id=0x702, data=b"\x05", is_extended_id=False))
         until(lambda: bool(seen))
@@ -75,3 +74,33 @@ def test_a_confirmation_of_what_was_sent_is_no_frame() -> None:
     finally:
         other.shutdown()
         port.close()
+
+
+def test_sent_and_received_frames_are_collected_until_the_tap_expires() -> None:
+    spec = BusSpec("can", interface="virtual", channel="frame tap")
+    here, there = (CanBus(spec, name, MonotonicClock()) for name in ("here", "there"))
+    tap = here.tap = FrameTap(math.inf)
+
+    def receive(count: int) -> None:
+        until(lambda: here.received >= count)
+        assert here.received == count
+
+    try:
+        for number in range(3):
+            here.send(0x201, bytes((number,)))
+            there.send(0x181, bytes((number,)))
+            receive(number + 1)
+        assert [(count, frame.identifier, frame.data) for count, frame in tap.newest] == [
+            (3, 0x201, b"\x02"),
+            (3, 0x181, b"\x02"),
+        ]
+        assert [frame.identifier for frame in tap.last] == [0x201, 0x181] * 3
+        tap.expires = 0.0
+        there.send(0x181, b"")
+        receive(4)
+        here.send(0x201, b"")
+        assert here.tap is None
+        assert len(tap.last) == 6
+    finally:
+        here.close()
+        there.close()

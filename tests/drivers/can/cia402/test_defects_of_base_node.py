@@ -11,7 +11,7 @@ import pytest
 
 from drive_on_bus import CLOCK, Driven, device, run_cycles, run_until
 from hand_made import NODE, RPDO, HandMade, codec
-from waiting import until
+from waiting import run_together, until
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
@@ -31,7 +31,6 @@ def axis(rig: Driven) -> Cia402Axis:
 
 def node_on(bus: CanBus, node: int = 1) -> SdoNode:
     spec = device()
-    assert spec.servo is not None
     return SdoNode(bus, node, Path(spec.path).parent / spec.servo.eds)
 
 
@@ -91,7 +90,6 @@ def test_4_a_refused_mode_is_an_error(rig: Driven, axis: Cia402Axis) -> None:
     """And nothing was written for it."""
     drive, _ = rig
     run_cycles(rig, axis, RequestedState.DISABLE, 3)
-    assert axis.drive is not None
     missing = next(m for m in ("IP", "CST", "PT", "XX") if m not in axis.drive.modes)
     before = len(drive.frames)
     with pytest.raises(NotPermitted, match=f"no mode {missing}; it has PP"):
@@ -176,10 +174,7 @@ def test_8_sdo_of_four_threads_do_not_mix(rig: Driven) -> None:
                 wrong.append(error)
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    run_together(threads)
     assert wrong == []
 
 

@@ -93,10 +93,8 @@ def test_a_written_object_arrives(data: bytes, node: int) -> None:
     for identifier, frame in write_frames(node, *key, data):
         assert identifier == 0x600 + node
         answer = server.answer(frame)
-        assert answer is not None
         assert answer[0] != 0x80, answer.hex()
     upload = server.answer(bytes((0x40,)) + struct.pack("<HB", *key) + bytes(4))
-    assert upload is not None
     size = 4 - (upload[0] >> 2 & 3) if upload[0] & 2 else int.from_bytes(upload[4:], "little")
     assert size == len(data)
     if upload[0] & 2:

@@ -95,7 +95,6 @@ def test_two_nodes_whose_answers_are_one_frame_are_distinguished_by_their_serial
     with opened(generic(1)) as (bus, rig):
         rig.inject("two nodes with one number")
         twin = rig.slaves[0].twin
-        assert twin is not None
         answer = twin.sdo.answer
         twin.sdo.answer = lambda data: answer(data) if data[1:4] == b"\x18\x10\x04" else None  # type: ignore[method-assign]
         found = scanned(bus)
