@@ -164,6 +164,12 @@ def _escaped(found: re.Match[str]) -> str:
     return found[0].encode("unicode_escape").decode("ascii")
 
 
+def some_of(names: Sequence[str], most: int = 30) -> str:
+    """Names with commas between them; of more than ``most`` the first, and how many more."""
+    left = len(names) - most
+    return ", ".join(names[:most]) + (f" and {left} more" if left > 0 else "")
+
+
 def suggest(word: str, known: list[str]) -> str:
     """``; did you mean 'x'?`` for close names and those that contain the word, else nothing."""
     folded = word.casefold()

@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 from winchkit.cli import main
 from winchkit.diagnosis.add import fitted_addition
 from winchkit.diagnosis.compare import compared
+from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.requirements import missing_needs
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.empirical import shown_id
@@ -116,6 +118,26 @@ def test_the_diagnosis_is_that_of_a_rotary_axis_in_other_units(folder: Path) -> 
     assert set(curves["force"].variables) & {"position", "motor_angle", "drum_angle"} == {
         "position"
     }
+
+
+def test_an_axis_of_larger_forces_has_the_same_scores_and_deviations(tmp_path: Path) -> None:
+    """Metamorphic: with 1000 times the mass and forces the usual sizes are 10⁻⁷ of the noise."""
+    (tmp_path / "bare.toml").write_text(HEAD + 'motion = "linear"\n')
+    bare, scores, masses = read_profile(tmp_path / "bare.toml"), [], []
+    for scale in (1.0, 1e3):
+        larger = {"force": Channel(run(1)["force"] * scale, "N")}
+        runs = [replace(run(1), channels={**run(1).channels, **larger})]
+        engine = selection_engine(prepare(runs, bare), load_catalogue())
+        fitted, noise = engine.fit_with_noise(engine.initial_model)
+        scores.append({s.candidate.effect.id: s.net_gain for s in engine.scores(fitted, noise)})
+        steps = diagnose(runs, bare).diagnosis.steps
+        values = {effect: v for step in steps for effect, v in step.parameters.items()}
+        assert set(values) == {"rotor-inertia", "motor-viscous", "motor-coulomb"}
+        masses.append(values["rotor-inertia"]["mass"])
+    assert scores[1] == pytest.approx(scores[0], rel=1e-3, abs=1e-3)
+    assert masses[0].value == pytest.approx(MASS, rel=0.01)
+    assert masses[1].value == pytest.approx(1e3 * masses[0].value, rel=1e-3)
+    assert masses[1].std == pytest.approx(1e3 * masses[0].std, rel=0.05)
 
 
 def test_a_comparison_and_an_addition_are_in_newtons(folder: Path, tmp_path: Path) -> None:

@@ -219,6 +219,7 @@ def test_too_much_to_say_is_cut_and_says_so() -> None:
     shown = sum(line[1:3] == ". " for line in lines)
     assert counted.startswith(f"… {9 - shown} more with --verbose: {OPEN.effects[0]}, ")
     assert any(line.startswith("To check:") for line in lines), "the next run is not cut off"
+    assert 25 < len(lines) <= 29, "steps have the lines that the rest leaves"
 
 
 def test_a_comparison_has_errors_and_their_attribution() -> None:

@@ -86,7 +86,7 @@ _USED = 0.95
 """Share of the samples of an output from which practically all are compared."""
 FAILS = "where it fails (shares of the error's variance)"
 _STEP_LINES = 12
-"""Lines of steps in the short text."""
+"""Lines of steps in the short text, or as many as the rest leaves."""
 
 
 def report_text(answer: Answer, *, verbose: bool = False) -> str:
@@ -96,7 +96,6 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     notes = [note for note in diagnosis.notes if verbose or note not in limits]
     blocks = [
         head_lines(diagnosis),
-        step_lines(diagnosis, falls_of(answer), None if verbose else _STEP_LINES),
         diagnosed_errors(diagnosis),
         _remaining(answer, verbose=verbose),
         _changes(diagnosis),
@@ -113,6 +112,14 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
         ]
     if verbose or diagnosis.interrupted:
         blocks.append(_candidates(answer))
+
+    def steps(most: int | None) -> list[str]:
+        return step_lines(diagnosis, falls, most)
+
+    falls, room = falls_of(answer), _MOST_LINES - 1 - len(joined(blocks).split("\n"))
+    shorter = (steps(most) for most in range(room, _STEP_LINES, -1))
+    fitting = next((lines for lines in shorter if len(lines) <= room), None)
+    blocks.insert(1, steps(None) if verbose else fitting or steps(_STEP_LINES))
     lines = joined(blocks).split("\n")
     if len(lines) > _MOST_LINES and not verbose:
         lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
@@ -155,7 +162,7 @@ def step_lines(
     lines: list[str] = []
     known = dict(enumerate(falls))
     told = reported_steps(diagnosis)
-    small = named_only([diagnosis.steps[index] for index in told])
+    small = named_only([diagnosis.steps[index] for index in told], diagnosis.outputs)
     for number, index in enumerate(told, start=1):
         step = diagnosis.steps[index]
         text = step_text(step, diagnosis.outputs, known.get(index))

@@ -19,6 +19,7 @@ from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import RunError
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 
 FACTORS = {
@@ -202,6 +203,20 @@ def test_a_sign_and_a_factor_are_found_where_inertia_follows_the_angle() -> None
     column = mending_column(found)
     assert column.startswith("motor_torque=-motor_torque*3.")
     assert column.endswith(" [N m]")
+
+
+@pytest.mark.parametrize(
+    ("channel", "slope", "column"),
+    [
+        ("motor_velocity", 0.0999, "motor_velocity=motor_velocity*10 [rad/s]"),
+        ("velocity", 1e-3, "velocity=velocity*1000 [m/s]"),
+        ("left.motor_velocity", 10.01, "left.motor_velocity=left.motor_velocity*0.1 [rad/s]"),
+    ],
+)
+def test_a_velocity_of_a_wrong_unit_is_corrected_by_an_import(
+    channel: str, slope: float, column: str
+) -> None:
+    assert mending_column(Finding("wrong-factor", "run", channel, slope, "")) == column
 
 
 def test_the_inertia_in_the_profile_is_a_prediction() -> None:

@@ -10,7 +10,7 @@ import pytest
 from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED, diagnosis_of
 from winchkit.diagnosis.results import Doubt, Estimate, Step
 from winchkit.report.text import step_lines
-from winchkit.report.words.sentence import headline
+from winchkit.report.words.sentence import headline, sentence
 from winchkit.report.words.steps import (
     alike,
     cause,
@@ -118,10 +118,12 @@ def test_a_refitted_value_has_that_of_the_file_in_the_same_unit() -> None:
 
 def test_refitted_values_are_counted_apart_from_missing_effects() -> None:
     old, new = replace(REFITTED, effects=("motor-viscous",)), FRICTION
-    assert cause([old, new]).startswith("the pulleys have Coulomb friction or ")
-    assert cause([old, new]).endswith("; 1 effect of the profile has other values")
-    assert cause([old, old, new, new]).startswith("2 effects are missing; first, the pulleys have")
-    assert cause([REFITTED, REFITTED]) == (
+    assert cause([old, new], {}).startswith("the pulleys have Coulomb friction or ")
+    assert cause([old, new], {}).endswith("; 1 effect of the profile has other values")
+    assert cause([old, old, new, new], {}).startswith(
+        "2 effects are missing; first, the pulleys have"
+    )
+    assert cause([REFITTED, REFITTED], {}) == (
         "2 effects of the profile have other values; first, axial stiffness 250 kN instead of 100 "
         "kN in the profile"
     )
@@ -196,5 +198,19 @@ def test_small_doubtful_effects_are_named_only_beside_what_explains_nearly_all(
     """Laws that overlap have small shares each, and together explain all."""
     main = replace(FRICTION, certain=True, share=share)
     small = replace(ELASTIC, certain=False, share=0.002)
-    assert len(named_only([main, small])) == count
-    assert ("2 effects" in cause([main, small])) == (count == 0)
+    assert len(named_only([main, small], {})) == count
+    assert ("2 effects" in cause([main, small], {})) == (count == 0)
+
+
+@pytest.mark.parametrize(("before", "count"), [(0.1, 0), (0.003, 1)])
+def test_a_small_effect_that_explains_more_than_all_that_is_left_is_reported(
+    before: float, count: int
+) -> None:
+    """Friction beside a weight: 0.2 % of the excess, and twice the noise."""
+    outputs = {"cable_length": replace(NOISY, heldout_rms_before=before, heldout_rms_after=3e-4)}
+    main = replace(FRICTION, certain=True, share=0.97)
+    small = replace(ELASTIC, certain=False, share=0.002)
+    assert len(named_only([main, small], outputs)) == count
+    text = sentence(diagnosis_of("explained", main, small, outputs=outputs))
+    assert ("2 effects are missing" in text) == (count == 0)
+    assert ("With either and 1 smaller effect, " in text) == (count == 1)

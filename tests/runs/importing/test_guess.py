@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -393,6 +394,19 @@ def test_columns_of_the_user_have_precedence() -> None:
     for text in ("tenson=x", "tension=x [furlong]", "x", "tension=x [deg]", "A.motor_angle=x [N]"):
         with pytest.raises(ValueError, match=words):
             read_column(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("motor_angle=4 [mm]", "of a linear axis this is position=4 [mm]"),
+        ("motor_torque=F [N]", "of a linear axis this is force=F [N]"),
+        ("force=Iq [mA]", "with a factor: 'force=Iq*35.1 [N]'"),
+    ],
+)
+def test_a_unit_of_another_quantity_gets_the_column_that_has_it(text: str, words: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(words)):
+        read_column(text)
 
 
 def test_a_minus_changes_the_sign_of_a_column(tmp_path: Path) -> None:

@@ -163,3 +163,33 @@ def test_columns_of_other_labs(head: str, tmp_path: Path) -> None:
     table = rows(*names.split(delimiter)[1:]).replace(",", delimiter)
     found = used(tmp_path / "log.csv", head + table)
     assert {c: i.source for c, i in found.items() if c != "time"} == OF_OTHERS[head]
+
+
+@pytest.mark.parametrize("names", [("", "", ""), ("time ", "angle ", "torque ")])
+def test_a_line_per_signal_is_a_column_per_signal(tmp_path: Path, names: tuple[str, ...]) -> None:
+    """As numpy.savetxt writes an array of signals; its lines are named or not."""
+    time = [k * 0.01 for k in range(COUNT)]
+    signals = time, [math.sin(t) for t in time], [math.cos(t) for t in time]
+    lines = [
+        name + " ".join(f"{value:.9e}" for value in signal)
+        for name, signal in zip(names, signals, strict=True)
+    ]
+    path = tmp_path / "signals.txt"
+    path.write_text("\n".join(lines) + "\n")
+    table = read_table(path)
+    assert table.layout == "text, blanks, a line per signal"
+    assert [column.source for column in table.columns] == [
+        name.strip() or str(number) for number, name in enumerate(names, start=1)
+    ]
+    for column, signal in zip(table.columns, signals, strict=True):
+        assert column.values == pytest.approx(signal, abs=1e-9)
+
+
+def test_of_many_columns_a_question_lists_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "wide.csv"
+    head = ",".join(f"signal_{k}" for k in range(500))
+    path.write_text("\n".join([head, *(",".join([str(k)] * 500) for k in range(20))]) + "\n")
+    (question,) = [
+        one for one in guess_columns(read_table(path)).questions if "no column is a ch" in one.text
+    ]
+    assert question.text.endswith("'signal_29' and 470 more")

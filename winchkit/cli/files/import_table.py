@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from winchkit.errors import one_line
+from winchkit.errors import one_line, some_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -99,7 +99,7 @@ def _not_used(items: Sequence[Assignment]) -> list[str]:
     by_reason: dict[str, list[str]] = {}
     for item in items:
         by_reason.setdefault(item.reason, []).append(one_line(item.source))
-    return [f"  not used, {why}: {', '.join(names)}" for why, names in by_reason.items()]
+    return [f"  not used, {why}: {some_of(names)}" for why, names in by_reason.items()]
 
 
 def _row(item: Assignment, column: FileColumn) -> tuple[str, ...]:

@@ -28,12 +28,14 @@ from winchkit.diagnosis.data.sampling import bridged, bridged_channel
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.line import Line
-from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, Signals
+from winchkit.model.stages import OUTPUTS, Signals
+from winchkit.runs.columns import column_dimension
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.factors import KNOWN_FACTORS, Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.units import UNITS
 
 _LARGEST = 1.8
 """Slope of measured over predicted, or its reciprocal, beyond which a unit is wrong; below the
@@ -120,7 +122,8 @@ def mending_column(finding: Finding) -> str:
     """Value of ``import --column`` that corrects a channel with a wrong sign or unit, such as
     ``motor_torque=-motor_torque*0.1 [N m]``; empty for the load, which may be metadata."""
     channel, slope = finding.channel, finding.value
-    if channel not in OUTPUT_UNITS:
+    dimension = column_dimension(channel)
+    if dimension is None or channel == "load":
         return ""
     sign = "-" if finding.code == "inverted-sign" else ""
     factor = ""
@@ -128,7 +131,7 @@ def mending_column(finding: Finding) -> str:
         exact = min(KNOWN_FACTORS, key=lambda known: abs(known * abs(slope) - 1))
         wrong = abs(exact * abs(slope) - 1) < _NEAR
         factor = f"*{exact if wrong else 1 / abs(slope):.4g}"
-    return f"{channel}={sign}{channel}{factor} [{OUTPUT_UNITS[channel]}]"
+    return f"{channel}={sign}{channel}{factor} [{next(iter(UNITS[dimension]))}]"
 
 
 def _outside(size: float) -> bool:

@@ -46,7 +46,8 @@ _MANY_PARTS = 3.0
 _NO_INFORMATION = 1e-9
 """Share of the information on an unknown below which a part says nothing of it."""
 _UNDETERMINED = 1e6
-"""In units of the usual size: an unknown with a larger standard deviation is undetermined."""
+"""In units of the usual size: an unknown whose standard deviation is larger, and larger than its
+value, is undetermined. On a heavy, slow axis a well determined mass has that size."""
 _LINEAR = 0.15
 """Relative error of Δχ² at which the search for an interval's end stops."""
 _SEARCHES = 4
@@ -170,7 +171,8 @@ def spread_of(
     covariance = covariance_by_likelihood.copy()
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
-    unknown = (statistical > _UNDETERMINED) | ~np.any(whitened, axis=0)
+    unknown = statistical > np.maximum(_UNDETERMINED, np.abs(fit.vector))
+    unknown |= ~np.any(whitened, axis=0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
     statistical[unknown] = _UNDETERMINED
     shift_by_discretization = covariance @ (

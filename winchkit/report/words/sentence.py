@@ -14,7 +14,7 @@ from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause, kinds_of, reported
+from winchkit.report.words.steps import cause, kinds_of, named_only, reported
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -62,7 +62,11 @@ def headline(diagnosis: Diagnosis) -> str:
         return f"{what} may be noise: these runs cannot decide"
     if verdict == "unknown":
         return _unknown_text(diagnosis, worst)
-    return capital(cause(steps)) if steps else f"The {worst} error is explained in part"
+    return (
+        capital(cause(steps, diagnosis.outputs))
+        if steps
+        else f"The {worst} error is explained in part"
+    )
 
 
 def _unknown_text(diagnosis: Diagnosis, worst: str) -> str:
@@ -101,6 +105,8 @@ def error_text(diagnosis: Diagnosis) -> str:
     count = 1 if first.whole else len(kinds_of(first))
     found = "it" if count == 1 else "either" if count == 2 else "any of them"
     opening = "With them" if others else f"With {found}"
+    if others and len(small := named_only(steps, outputs)) == len(others):
+        opening = f"With {found} and {len(small)} smaller effect{'s' if len(small) > 1 else ''}"
     if diagnosis.verdict == "unknown":
         opening = f"With the effect{'s' if others else ''} found"
     if not others and all(is_wrong_value(effect) for effect in first.effects):

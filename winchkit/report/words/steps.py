@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import degrees, inf, isfinite
 from typing import TypeVar
 
+from winchkit.diagnosis.regression.cross_validation import excess
 from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step
 from winchkit.effects.transition import TRANSITION
 from winchkit.quantity_text import percent, scale_for, significant, with_std
@@ -82,13 +83,17 @@ def _is_negligible(step: Step) -> bool:
     return all(_agrees(estimate, step.file_values[name]) for name, estimate in sizes.items())
 
 
-def named_only(steps: Sequence[Step]) -> list[Step]:
+def named_only(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> list[Step]:
     """Additions that are doubtful and explain less than a hundredth of the excess each, where the
     others explain nine tenths without them.
+
+    One that explains more than all that is left is none: beside a weight, friction is small.
     """
-    small = [
-        s for s in steps if not s.certain and not s.refitted and explained_share(s) < _NEGLIGIBLE
-    ]
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    before = excess({name: output.heldout_rms_before for name, output in outputs.items()}, noise)
+    left = sum((outputs[name].heldout_rms_after / n) ** 2 for name, n in noise.items() if n)
+    least = min(_NEGLIGIBLE, left / before) if before else _NEGLIGIBLE
+    small = [s for s in steps if not s.certain and not s.refitted and explained_share(s) < least]
     main = sum(explained_share(step) for step in steps if step not in small)
     return small if main > _MAIN else []
 
@@ -100,7 +105,7 @@ def _agrees(estimate: Estimate, file_value: float) -> bool:
     return low <= file_value <= high
 
 
-def cause(steps: Sequence[Step]) -> str:
+def cause(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> str:
     """What is missing, as the headline of a diagnosis with steps; without a full stop."""
     added = [step for step in steps if not step.refitted]
     refitted = len(steps) - len(added)
@@ -109,7 +114,7 @@ def cause(steps: Sequence[Step]) -> str:
         return first
     if not added:
         return f"{refitted} effects of the profile have other values; first, {first}"
-    count = len(added) - len(named_only(steps))
+    count = len(added) - len(named_only(steps, outputs))
     text = first if count <= 1 else f"{count} effects are missing; first, {first}"
     if refitted:
         have = "effect of the profile has" if refitted == 1 else "effects of the profile have"

@@ -16,6 +16,7 @@ from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.runs.importing.units.spelling import read_unit
+from winchkit.schema.linear_axis import CHANNELS as LINEAR
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.schema.plausible import typed_quantity
 from winchkit.units import UNITS
@@ -278,9 +279,15 @@ def read_column(text: str) -> ColumnAnswer:
         units = ", ".join(UNITS[dimension]) if dimension else "1"
         raise UsageError(f"'{unit}' in '{text}' is no known unit; use one of {units}")
     if spelled is not None and not fits(channel, spelled.dimension):
+        known_units = list(UNITS[dimension or "ratio"])
+        use = f"use {', '.join(known_units)}"
+        linear = LINEAR.get(channel, "")
+        if linear and column_dimension(linear) == spelled.dimension:
+            use += f"; of a linear axis this is {linear}={found['source']} [{unit}]"
+        elif spelled.dimension == "current" and found["factor"] is None:
+            use += f", with a factor: '{channel}={found['source']}*35.1 [{known_units[0]}]'"
         raise UsageError(
-            f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
-            + ", ".join(UNITS[dimension or "ratio"])
+            f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; {use}"
         )
     factor = float(_with_point(found["factor"])) if found["factor"] else None
     source, constant = found["source"], found["constant"] or ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from winchkit.errors import some_of
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import (
     Choice,
@@ -139,7 +140,7 @@ def ask_columns(work: Work, choice: Choice) -> None:
             )
         )
     if not bases - {"time", DATE} and not choice.questions:
-        names = ", ".join(repr(c.column.source) for c in choice.unused)
+        names = some_of([repr(c.column.source) for c in choice.unused])
         there = f"; there are {names}" if names else ": the file has times only"
         work.questions.append(
             Question(

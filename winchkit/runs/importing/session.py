@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import number, require_types
-from winchkit.errors import Fault, FileError, RunError, UsageError, of_each, one_line
+from winchkit.errors import Fault, FileError, RunError, UsageError, of_each, one_line, some_of
 from winchkit.runs.importing.answers import Answers, answers_of, read_answers
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.candidates import is_linear
@@ -154,7 +154,7 @@ def guesses_of(
     }
     for option, name in [(option, name) for option, names in named.items() for name in names]:
         if not any(guess.file.column(name) for guess in guesses):
-            has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
+            has = some_of([repr(c.source) for guess in guesses for c in guess.file.columns])
             raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
     if mapping is None and guesses and (idle := tuple(_without_use(guesses, tables, answers))):
         guesses[0] = replace(guesses[0], notes=(*guesses[0].notes, *idle))

@@ -47,6 +47,9 @@ _COMPARED = 20
 _SUMMARY = 12
 """Most rows of a summary: mean, extremes, deviation and their units."""
 _LEFT_OUT = "The row is left out"
+_FEWEST_SAMPLES = 64
+"""Numbers in a line from which it may be a signal; a table has seldom as many columns, and a
+recording never fewer samples than signals."""
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
 
@@ -81,6 +84,10 @@ def _table_of_lines(
         raise RunError(Fault(message, path))
     if doubt := doubt_of_commas(lines, dialect):
         raise RunError(Fault(doubt, path))
+    if signals := _line_per_signal(lines, dialect):
+        turned = [dialect.delimiter.join(cells) for cells in zip(*signals, strict=True)]
+        table = _table_of_lines(path, turned, None, encoding, is_ended=is_ended)
+        return replace(table, layout=f"{table.layout}, a line per signal")
     end = _end_of_header(lines)
     names = next((n for n in range(end, len(lines)) if lines[n].strip()), end)
     # LabVIEW has a column of comments, of which rows without one have no cell.
@@ -89,6 +96,20 @@ def _table_of_lines(
     rows = _SplitLines(lines, dialect.delimiter, numbers, (names, width))
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
     return replace(table_of_rows(path, rows, dialect, is_ended=is_ended), layout=layout)
+
+
+def _line_per_signal(lines: Sequence[str], dialect: Dialect) -> list[list[str]]:
+    """Cells of lines of which each has the samples of a signal, its name before them or none."""
+    given = [line for line in lines if line.strip() and not line.startswith("#")]
+    if not _FEWEST_SAMPLES <= dialect.width > 2 * len(given):
+        return []
+    split = [split_line(line, dialect.delimiter) for line in given]
+    is_whole = all(
+        len(cells) == dialect.width
+        and all(number(cell, dialect.decimal) is not None for cell in cells[1:])
+        for cells in split
+    )
+    return split if is_whole else []
 
 
 def _end_of_header(lines: Sequence[str]) -> int:
