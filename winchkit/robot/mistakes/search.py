@@ -302,8 +302,9 @@ class _MistakeSearch:
             return (*units, axes_mistake(axes))
         return (*units, MIRRORED)
 
-    def _adjusted(self, mistakes: tuple[Mistake, ...]) -> _Adjusted:
-        """A trial with the geometry free; its error is the misfit, m."""
+    def _adjusted(self, mistakes: tuple[Mistake, ...], *, turned: bool = False) -> _Adjusted:
+        """A trial with the geometry free; its error is the misfit, m. ``turned``: the measured
+        rotations take part."""
         table = mended(self.measured, mistakes)
         if len(table) > _MOST:
             kept = np.zeros(len(table), dtype=bool)
@@ -314,16 +315,17 @@ class _MistakeSearch:
         tracker = declared_tracker(self.robot.profile)
         if not np.all(np.isfinite(closure)):
             return _Adjusted(mistakes, float("inf"), table, start, rotation_by(tracker.turn))
-        tracker = registered(tracker, start, table.position, table.angles, {"frame"})
+        free = {"frame", "mounting"} if turned else {"frame"}
+        tracker = registered(tracker, start, table.position, table.angles, free)
         instruments = InstrumentValues(frozenset(), ("",), (tracker,))
-        equations = adjustment_of(self.robot, table, instruments)
+        equations = adjustment_of(self.robot, table, instruments, turned=turned)
         sigma = _SIGMA * self.motion
         solution = adjusted(equations, start, sigma)
         own = equations.instruments_at(solution.state.values)
         assert own is not None, "they have the tracker"
-        turned = rotation_by(own.trackers[0].turn)
+        frame = rotation_by(own.trackers[0].turn)
         error = misfit(equations, solution, sigma)
-        return _Adjusted(mistakes, error, table, solution.state.pose, turned)
+        return _Adjusted(mistakes, error, table, solution.state.pose, frame)
 
     def _of_rotations(self, best: _Adjusted) -> Iterator[Named]:
         """Mistakes of the rotations beside the poses of the adjusted table."""
@@ -331,20 +333,24 @@ class _MistakeSearch:
             return
         if not best.error <= _WRONG * self.motion:
             return
-        pose, turned = best.pose, best.turned
-        frames, codes = [turned, np.eye(3)], [m.code for m in best.mistakes]
-        if "position-axes" in codes:
-            # Rotations in a left-handed frame P are P R Pᵀ, which is (−P) R (−P)ᵀ.
-            frames.append(-best.mistakes[codes.index("position-axes")].axes @ turned)
+        codes = [m.code for m in best.mistakes]
 
         def compared(mistakes: tuple[Mistake, ...]) -> _Trial:
+            rotation, frames = best.pose.rotation, [best.turned, np.eye(3)]
             shown = rotation_of(*mended(best.table, mistakes).angles.T)
-            free = [_frame_of(pose.rotation, shown)] if "mirrored" in codes else []
-            own = [*frames, *free]
-            return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
+            if "position-axes" in codes:
+                # Rotations in a left-handed frame P are P R Pᵀ, which is (−P) R (−P)ᵀ.
+                axes = best.mistakes[codes.index("position-axes")].axes
+                frames.append(-axes @ best.turned)
+            if "mirrored" in codes:
+                frames.append(_frame_of(rotation, shown))
+            return _Trial(mistakes, min(_angle(rotation, shown, f) for f in frames))
 
         plain, every = compared(()), list(rotation_mistakes())
         if plain.error <= _ANGLE_NOISE:
+            return
+        # Cables that run through the middle of a platform hardly hold its rotation.
+        if self._adjusted(best.mistakes, turned=True).error < _NEAR * best.error:
             return
         best_set = [plain]
         units = [m for m in every if m.code.startswith("rotation-unit")]
@@ -354,7 +360,7 @@ class _MistakeSearch:
             if trials[0].error * _ROTATION_FACTOR < best_set[0].error:
                 near = _ROTATION_NEAR * trials[0].error
                 best_set = [trial for trial in trials if trial.error < near]
-        spread = rotation_vector(pose.rotation @ mean_rotation(pose.rotation).T)
+        spread = rotation_vector(best.pose.rotation @ mean_rotation(best.pose.rotation).T)
         turns = float(np.median(np.linalg.norm(spread, axis=1)))
         if not best_set[0].mistakes and plain.error > max(_UNLIKE * turns, _LEAST_ANGLE):
             yield Named(((UNKNOWN_ROTATIONS,),), plain.error, 0.0, "rad", self.place)
