@@ -39,7 +39,7 @@ _STD = {
 """Standard deviations of the priors, m and rad; of a winding radius as a share (rules of thumb:
 several times what a drawing, a tape and a rough set-up are wrong by)."""
 _LEAST_RADIUS = 1e-4
-_ANGLE = 0.01
+ANGLE = 0.01
 """Standard deviation of a measured angle, rad: several times that of a camera tracker."""
 
 
@@ -79,9 +79,12 @@ def adjustment_of(
     )
 
 
-def adjusted(adjustment: RobotEquations, pose: Pose, sigma: float) -> Solution:
-    """The adjustment from these poses; ``sigma``: standard deviation of an equation, m."""
-    weights = Weights({"closure": sigma, "position": sigma, "rotation": _ANGLE}, robust=True)
+def adjusted(
+    adjustment: RobotEquations, pose: Pose, sigma: float, angle: float = ANGLE
+) -> Solution:
+    """The adjustment from these poses; ``sigma``: standard deviation of an equation, m; ``angle``:
+    of a rotation, rad."""
+    weights = Weights({"closure": sigma, "position": sigma, "rotation": angle}, robust=True)
     return solve(adjustment, BundleState(adjustment.parameters.nominal, pose), weights)
 
 
