@@ -135,6 +135,16 @@ def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None
     assert after < before / (10 if rotations else 3)
 
 
+def test_lengths_at_home_of_a_hanging_robot_are_tried() -> None:
+    """One cable 100 mm off, which no other contradicts: the rotations do."""
+    believed, measured = hanging()
+    motor = measured.motor_angle + np.array([wound_in(0, 0.1), 0, 0, 0])
+    fit, held = split(replace(measured, motor_angle=motor))
+    found = calibrate(believed, fit, held)
+    assert "home_length" in found.equations.parameters.block
+    assert rms(found.validation_after.distance) < 5e-4
+
+
 def test_proposed_poses_are_such_that_it_rests_there() -> None:
     """No motion that keeps the cables' lengths moves the centre of mass up or down."""
     believed, measured = hanging()
