@@ -23,6 +23,7 @@ from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.forces.balance import hanging_balance
 from winchkit.robot.geometry.pose_estimation import moved_pose
+from winchkit.robot.mistakes.search import mistakes_in
 from winchkit.schema.profiles.robot import PriorSpec
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -134,6 +135,16 @@ def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None
     assert after < before / (10 if rotations else 3)
 
 
+def test_lengths_at_home_of_a_hanging_robot_are_tried() -> None:
+    """One cable 100 mm off, which no other contradicts: the rotations do."""
+    believed, measured = hanging()
+    motor = measured.motor_angle + np.array([wound_in(0, 0.1), 0, 0, 0])
+    fit, held = split(replace(measured, motor_angle=motor))
+    found = calibrate(believed, fit, held)
+    assert "home_length" in found.equations.parameters.block
+    assert rms(found.validation_after.distance) < 5e-4
+
+
 def test_proposed_poses_are_such_that_it_rests_there() -> None:
     """No motion that keeps the cables' lengths moves the centre of mass up or down."""
     believed, measured = hanging()
@@ -154,6 +165,25 @@ def test_proposed_poses_are_such_that_it_rests_there() -> None:
         free = null_space(slope.T)
         assert free.shape == (6, 2)
         np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("rotations", [True, False])
+def test_mistakes_of_a_hanging_robot_are_named(rotations: bool) -> None:
+    """Where its weight leaves the platform at each pose, contradicts the positions."""
+    believed, measured = hanging()
+    measured = measured[np.arange(COUNT) < COUNT // 2]
+    if not rotations:
+        measured = replace(measured, angles=np.full_like(measured.angles, np.nan))
+    motor = measured.motor_angle
+    for wrong, code in (
+        (motor, []),
+        (motor[:, [0, 2, 1, 3]], ["motor-columns:2-3"]),
+        (motor * [1, 1, 1, -1], ["motor-sign:4"]),
+        (np.degrees(motor), ["motor-unit:deg"]),
+        (np.roll(motor, 1, axis=0), ["rows:1"]),
+    ):
+        found = mistakes_in(believed, replace(measured, motor_angle=wrong))
+        assert [named.code for named in found] == code
 
 
 MASS = 3.0

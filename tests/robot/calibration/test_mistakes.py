@@ -10,6 +10,8 @@ import pytest
 
 import robot_mistakes
 from robot_poses.mistaken import KINDS, Scene, mistake_of, profile_text, recorded
+from small_robots import RADIUS, RATIO, small_robot
+from winchkit.arrays import Array
 from winchkit.errors import RunError
 from winchkit.robot import robot_of
 from winchkit.robot.files.poses import MeasuredPoses, read_poses
@@ -62,6 +64,32 @@ def test_rows_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
     order = np.random.default_rng(1).permutation(SCENE.poses)
     shuffled = replace(table, position=table.position[order], oriented=False)
     assert found(tmp_path, shuffled.csv()) == ["poses-unlike"]
+
+
+def test_rotations_that_the_cables_hardly_hold_are_those_of_the_poses(tmp_path: Path) -> None:
+    """Cables that run through the middle of a platform hold two angles."""
+    exits = ((-0.5, -0.4, 0.0), (0.5, -0.4, 0.0), (0.5, 0.4, 0.0), (-0.5, 0.4, 0.0))
+    anchors = ((-0.05, -0.05, 0.0), (0.05, -0.05, 0.0), (0.05, 0.05, 0.0), (-0.05, 0.05, 0.0))
+    robot = small_robot(exits, anchors, ("x", "y", "yaw"), home=(0.0, 0.0, 0.0))
+    rng = np.random.default_rng(5)
+    offset = rng.normal(0, 4e-3, (2, 4, 3))
+    e, b = np.array(exits) + offset[0], np.array(anchors) + offset[1]
+
+    def length(x: float, y: float, yaw: float) -> Array:
+        away = x + b[:, 0] * np.cos(yaw) - b[:, 1] * np.sin(yaw) - e[:, 0]
+        aside = y + b[:, 0] * np.sin(yaw) + b[:, 1] * np.cos(yaw) - e[:, 1]
+        return np.asarray(np.hypot(away, aside))
+
+    columns = [*(f"{n}.motor_angle [rad]" for n in robot.names), "platform_x [m]"]
+    columns += ["platform_y [m]", *(f"platform_{a} [rad]" for a in ("roll", "pitch", "yaw"))]
+    lines = [",".join(columns)]
+    for x, y, yaw in rng.uniform([-0.15, -0.15, -0.3], [0.15, 0.15, 0.3], (20, 3)).tolist():
+        motor = (length(0.0, 0.0, 0.0) - length(x, y, yaw)) / RADIUS * RATIO
+        seen = np.array([x, y, yaw]) + rng.normal(0, [3e-5, 3e-5, 2e-4])
+        lines.append(",".join(map(str, [*motor, *seen[:2], 0.0, 0.0, seen[2]])))
+    path = tmp_path / "poses.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert mistakes_in(robot, read_poses([read_run(path)], robot.profile)) == ()
 
 
 def test_the_sentence_says_where_what_and_what_to_do(tmp_path: Path) -> None:

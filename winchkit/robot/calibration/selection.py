@@ -83,7 +83,7 @@ BEYOND_PRIOR = 3.0
 """Standard deviations of its prior beyond which a parameter has left it, and a winding radius
 imitates another gear ratio."""
 _ODD = 5.0
-"""Ratio of the closures' standard deviation to that of a usual encoder from which the lengths at
+"""Ratio of a standard deviation to that of a usual encoder or tracker from which the lengths at
 home are tried (rule of thumb: robots have up to this by their cables and pulleys)."""
 POINTS = ("exit_point", "anchor_point")
 """Points of the robot."""
@@ -204,7 +204,9 @@ def _with_home(
     Lengths some millimetres off look like another frame: it is tried before a tracker is blamed
     that the file does not declare unknown, and where cables and geometry disagree."""
     blamed = best.free - _instruments(equations).free
-    odd = best.weights.sigma.get("closure", 0.0) > _ODD * NOISE["closure"].start
+    # The cables of a hanging platform close at any lengths: what is wrong is left in its poses.
+    kinds = ("closure", "position", "rotation") if equations.robot.hangs else ("closure",)
+    odd = any(best.weights.sigma.get(kind, 0.0) > _ODD * NOISE[kind].start for kind in kinds)
     if "home_length" in equations.parameters.block or not (blamed or odd):
         return None
     trial = replace(equations, effects=(*equations.effects, HOME_LENGTH))

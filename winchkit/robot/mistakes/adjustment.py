@@ -34,10 +34,13 @@ _STD = {
     "home_length": 0.1,
     "tracker_frame": 1.0,
     "reflector": 0.1,
+    "mounting": 1.0,
 }
 """Standard deviations of the priors, m and rad; of a winding radius as a share (rules of thumb:
 several times what a drawing, a tape and a rough set-up are wrong by)."""
 _LEAST_RADIUS = 1e-4
+ANGLE = 0.01
+"""Standard deviation of a measured angle, rad: several times that of a camera tracker."""
 
 
 def adjustment_of(
@@ -45,14 +48,17 @@ def adjustment_of(
     measured: MeasuredPoses,
     instruments: InstrumentValues,
     held: frozenset[str] = frozenset(),
+    *,
+    turned: bool = False,
 ) -> RobotEquations:
-    """Equations of lengths and positions; trackers start at their registration, ``held`` blocks of
-    parameters keep their values."""
+    """Equations of lengths and positions, of measured rotations too where ``turned``; trackers
+    start at their registration, ``held`` blocks of parameters keep their values."""
     robot = replace(robot, profile=replace(robot.profile, effect=()))
-    instruments = replace(instruments, free=frozenset({"frame", "reflector"}))
+    free = {"frame", "reflector"} | ({"mounting"} if turned else set())
+    instruments = replace(instruments, free=frozenset(free))
+    left_out = ("swivel", "cable_length", "tension") + (() if turned else ("angles",))
     nothing: dict[str, Any] = {
-        name: np.full_like(getattr(measured, name), np.nan)
-        for name in ("angles", "swivel", "cable_length", "tension")
+        name: np.full_like(getattr(measured, name), np.nan) for name in left_out
     }
     measured = replace(measured, **nothing)
     parameters = parameters_of(robot, measured, (HOME_LENGTH,), instruments)
@@ -73,9 +79,12 @@ def adjustment_of(
     )
 
 
-def adjusted(adjustment: RobotEquations, pose: Pose, sigma: float) -> Solution:
-    """The adjustment from these poses; ``sigma``: standard deviation of an equation, m."""
-    weights = Weights({"closure": sigma, "position": sigma}, robust=True)
+def adjusted(
+    adjustment: RobotEquations, pose: Pose, sigma: float, angle: float = ANGLE
+) -> Solution:
+    """The adjustment from these poses; ``sigma``: standard deviation of an equation, m; ``angle``:
+    of a rotation, rad."""
+    weights = Weights({"closure": sigma, "position": sigma, "rotation": angle}, robust=True)
     return solve(adjustment, BundleState(adjustment.parameters.nominal, pose), weights)
 
 

@@ -13,21 +13,28 @@ Rotations are compared afterwards with those of the adjusted poses, under each c
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
+from winchkit.model.rotation import (
+    angles_of,
+    mean_rotation,
+    rotation_by,
+    rotation_of,
+    rotation_vector,
+)
 from winchkit.robot.files.poses import MeasuredPoses
+from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.geometry.tracker import declared_tracker, registered
+from winchkit.robot.geometry.tracker import declared_tracker, reading_of, registered
 from winchkit.robot.identification.instruments import InstrumentValues
-from winchkit.robot.mistakes.adjustment import adjusted, adjustment_of, misfit
+from winchkit.robot.mistakes.adjustment import ANGLE, adjusted, adjustment_of, misfit
 from winchkit.robot.mistakes.table import (
     MIRRORED,
     POSITION_UNITS,
@@ -75,6 +82,9 @@ these poses (rules of thumb)."""
 _ANGLE_NOISE = 3e-3
 """Median angle, rad, up to which rotations are those of the poses: twice the noise of camera
 trackers (0.1 deg); a convention that changes no more is none of these mistakes."""
+_REST_ANGLE = 0.1
+"""Standard deviation, rad, of the rotation of a hanging platform about that in which it rests by
+the geometry of the file: points some centimetres off tilt a platform of decimetres by as much."""
 _SETTLING = Iteration(damping=1e-6, relative_damping=1e-6, tolerance=1e-5, steps=25)
 
 
@@ -120,8 +130,9 @@ class Named:
         listed = ", or ".join(" and ".join(m.text for m in one) for one in self.sets)
         cures = dict.fromkeys(m.cure for one in self.sets[:1] for m in one)
         rest = f", and by {self.after * factor:.3g} {size} without that" if self.after else ""
+        far = f"{self.before * factor:.3g} {size}" if np.isfinite(self.before) else "no finite size"
         return (
-            f"{listed}: {what} differ by {self.before * factor:.3g} {size} as they are{rest} "
+            f"{listed}: {what} differ by {far} as they are{rest} "
             f"(rms beside a free geometry); {'; '.join(cures)}"
         )
 
@@ -134,9 +145,10 @@ def refuse_mistakes(robot: Robot, measured: MeasuredPoses) -> None:
 
 
 def mistakes_in(robot: Robot, measured: MeasuredPoses) -> tuple[Named, ...]:
-    """Mistakes of each run of twelve poses or more of a robot whose cables hold its platform."""
+    """Mistakes of each run of twelve poses or more; of a hanging platform where its weight is known
+    and positions were measured, since its lengths alone contradict nothing."""
     out: list[Named] = []
-    if robot.hangs:
+    if robot.hangs and not (robot.platform.mass > 0 and np.any(np.isfinite(measured.position))):
         return ()
     for run in np.unique(measured.run):
         own = _whole(measured[measured.run == run])
@@ -232,9 +244,17 @@ class _MistakeSearch:
         """Poses (h, p) of motor angles (h, p, n) by the lengths alone, and median residuals (h,)
         but for a constant of each line, whose home length may be unknown."""
         many, count, lines = angle.shape
+        shape = (many, count)
         geometry, home = self.robot.geometry, self.robot.home
         given = self.robot.lengths_at(angle.reshape(-1, lines))
         given = np.where(np.abs(given) < 10 * geometry.size, given, np.nan)
+        if self.robot.hangs:
+            found = forward(geometry, given, home, self.robot.platform)
+            pose = Pose(
+                found.pose.position.reshape(*shape, 3), found.pose.rotation.reshape(*shape, 3, 3)
+            )
+            enough = np.count_nonzero(found.converged.reshape(shape), axis=1) > count / 2
+            return pose, np.where(enough, 0.0, np.inf)
 
         def whitened(pose: Pose) -> tuple[Array, Array]:
             length, by = linearised(geometry, pose.position, pose.rotation)
@@ -252,9 +272,8 @@ class _MistakeSearch:
         with np.errstate(invalid="ignore"):
             about = np.abs(residual - np.median(residual, axis=1, keepdims=True))
         error = np.median(about.reshape(many, -1), axis=1)
-        shape = (many, count)
-        found = Pose(pose.position.reshape(*shape, 3), pose.rotation.reshape(*shape, 3, 3))
-        return found, np.where(np.isfinite(error), error, np.inf)
+        pose = Pose(pose.position.reshape(*shape, 3), pose.rotation.reshape(*shape, 3, 3))
+        return pose, np.where(np.isfinite(error), error, np.inf)
 
     def _with_positions(
         self, motors: tuple[Mistake, ...], pose: Pose, rows: Array, closure: float, most: int
@@ -273,8 +292,11 @@ class _MistakeSearch:
             if len(motors) + len(of_rows) > most:
                 continue
             seen = self.measured.position[rows - shift]
+            known = np.isfinite(pose.position[:, 0])
             for left_handed in (False, True):
-                turned, scale, error = _registration(seen, pose.position, left_handed=left_handed)
+                turned, scale, error = _registration(
+                    seen[known], pose.position[known], left_handed=left_handed
+                )
                 of_positions = self._of_positions(turned, scale, left_handed=left_handed)
                 if of_positions is None:
                     continue
@@ -302,8 +324,9 @@ class _MistakeSearch:
             return (*units, axes_mistake(axes))
         return (*units, MIRRORED)
 
-    def _adjusted(self, mistakes: tuple[Mistake, ...]) -> _Adjusted:
-        """A trial with the geometry free; its error is the misfit, m."""
+    def _adjusted(self, mistakes: tuple[Mistake, ...], *, turned: bool = False) -> _Adjusted:
+        """A trial with the geometry free; its error is the misfit, m. ``turned``: the measured
+        rotations take part."""
         table = mended(self.measured, mistakes)
         if len(table) > _MOST:
             kept = np.zeros(len(table), dtype=bool)
@@ -314,16 +337,24 @@ class _MistakeSearch:
         tracker = declared_tracker(self.robot.profile)
         if not np.all(np.isfinite(closure)):
             return _Adjusted(mistakes, float("inf"), table, start, rotation_by(tracker.turn))
-        tracker = registered(tracker, start, table.position, table.angles, {"frame"})
+        if self.robot.hangs:
+            found = np.isfinite(start.position[:, 0])
+            table, start = table[found], start[found]
+        free = {"frame", "mounting"} if turned else {"frame"}
+        tracker = registered(tracker, start, table.position, table.angles, free)
         instruments = InstrumentValues(frozenset(), ("",), (tracker,))
-        equations = adjustment_of(self.robot, table, instruments)
+        seen, angle = table, ANGLE
+        if self.robot.hangs and not turned:
+            shown = angles_of(reading_of(tracker, start).rotation)
+            seen, angle, turned = replace(table, angles=shown), _REST_ANGLE, True
+        equations = adjustment_of(self.robot, seen, instruments, turned=turned)
         sigma = _SIGMA * self.motion
-        solution = adjusted(equations, start, sigma)
+        solution = adjusted(equations, start, sigma, angle)
         own = equations.instruments_at(solution.state.values)
         assert own is not None, "they have the tracker"
-        turned = rotation_by(own.trackers[0].turn)
+        frame = rotation_by(own.trackers[0].turn)
         error = misfit(equations, solution, sigma)
-        return _Adjusted(mistakes, error, table, solution.state.pose, turned)
+        return _Adjusted(mistakes, error, table, solution.state.pose, frame)
 
     def _of_rotations(self, best: _Adjusted) -> Iterator[Named]:
         """Mistakes of the rotations beside the poses of the adjusted table."""
@@ -331,20 +362,24 @@ class _MistakeSearch:
             return
         if not best.error <= _WRONG * self.motion:
             return
-        pose, turned = best.pose, best.turned
-        frames, codes = [turned, np.eye(3)], [m.code for m in best.mistakes]
-        if "position-axes" in codes:
-            # Rotations in a left-handed frame P are P R Pᵀ, which is (−P) R (−P)ᵀ.
-            frames.append(-best.mistakes[codes.index("position-axes")].axes @ turned)
+        codes = [m.code for m in best.mistakes]
 
         def compared(mistakes: tuple[Mistake, ...]) -> _Trial:
+            rotation, frames = best.pose.rotation, [best.turned, np.eye(3)]
             shown = rotation_of(*mended(best.table, mistakes).angles.T)
-            free = [_frame_of(pose.rotation, shown)] if "mirrored" in codes else []
-            own = [*frames, *free]
-            return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
+            if "position-axes" in codes:
+                # Rotations in a left-handed frame P are P R Pᵀ, which is (−P) R (−P)ᵀ.
+                axes = best.mistakes[codes.index("position-axes")].axes
+                frames.append(-axes @ best.turned)
+            if "mirrored" in codes:
+                frames.append(_frame_of(rotation, shown))
+            return _Trial(mistakes, min(_angle(rotation, shown, f) for f in frames))
 
         plain, every = compared(()), list(rotation_mistakes())
         if plain.error <= _ANGLE_NOISE:
+            return
+        # Cables that run through the middle of a platform hardly hold its rotation.
+        if self._adjusted(best.mistakes, turned=True).error < _NEAR * best.error:
             return
         best_set = [plain]
         units = [m for m in every if m.code.startswith("rotation-unit")]
@@ -354,7 +389,7 @@ class _MistakeSearch:
             if trials[0].error * _ROTATION_FACTOR < best_set[0].error:
                 near = _ROTATION_NEAR * trials[0].error
                 best_set = [trial for trial in trials if trial.error < near]
-        spread = rotation_vector(pose.rotation @ mean_rotation(pose.rotation).T)
+        spread = rotation_vector(best.pose.rotation @ mean_rotation(best.pose.rotation).T)
         turns = float(np.median(np.linalg.norm(spread, axis=1)))
         if not best_set[0].mistakes and plain.error > max(_UNLIKE * turns, _LEAST_ANGLE):
             yield Named(((UNKNOWN_ROTATIONS,),), plain.error, 0.0, "rad", self.place)
