@@ -47,6 +47,9 @@ imitated, presliding of EMPS that predicts another file better stands in one of 
 _LEFT_OF_REST = 0.5
 """What an addition may leave of such a rest, over what it explains of it; screened: effects that
 were there left up to 0.43, imitations at least 0.82."""
+_ACCURACY, _LEFT_BESIDE = 1e-3, 2.0
+"""The same two for errors of any size: a law is accurate to some 3 % of what it changes, but
+several other effects may be there: friction and viscosity beside a weight."""
 _LACK_OF_FIT_LEVEL = 0.02
 """Level of the lack-of-fit test after Bonferroni; convention."""
 _SCORE_LEVEL = 0.99
@@ -156,7 +159,7 @@ def _imitates_rest(
     """Whether a larger model's addition imitates what the laws of the present effects leave.
 
     Where they leave a hundredth of the excess and errors of the size of the noise, the addition has
-    to explain two thirds of it.
+    to explain two thirds of it; where they leave a thousandth, a third.
     """
     added = [t.effect for t in larger.hypothesis.terms if t.label not in present.labels]
     own = set().union(*(engine.regression.outputs_of(effect.stage) for effect in added))
@@ -165,10 +168,10 @@ def _imitates_rest(
         held_out_rms(engine.regression, fitted, noise, folds)
         for fitted in (initial, present, larger)
     ]
-    if any(errors[1][output] > _REST_ERROR * noise.rms[output] for output in own):
-        return False
     before, left, after = (excess({o: e[o] for o in own}, noise.rms) for e in errors)
-    return left <= _REST * before and after > _LEFT_OF_REST * (left - after)
+    is_noise = all(errors[1][output] <= _REST_ERROR * noise.rms[output] for output in own)
+    rest, least = (_REST, _LEFT_OF_REST) if is_noise else (_ACCURACY, _LEFT_BESIDE)
+    return left <= rest * before and after > least * (left - after)
 
 
 def with_delays(engine: SelectionEngine, present: Fit, noise: BandNoise) -> tuple[Fit, BandNoise]:
