@@ -19,7 +19,7 @@ from winchkit.schema.profiles.axis import AxisProfile
 def test_the_reversal_of_a_strong_friction_is_not_explained_by_other_effects(
     tmp_path: Path,
 ) -> None:
-    """Sharp friction through a logger, 40 times the noise: five effects were reported, in 72 CPU s."""
+    """Sharp friction through a logger, 40 times the noise: five effects were found for it."""
     paths, profile = write_case(Job("friction", 6402, 1, 300.0).case(), tmp_path)
     found = diagnose([read_run(path) for path in paths], read_profile(profile)).diagnosis
     assert found.verdict == "explained"
