@@ -85,7 +85,9 @@ def poll(
 
 
 def test_readings_come() -> None:
-    instrument, seen = poll(lambda _n, reply: (0.0, reply), lambda i: i.counters.readings > 20)
+    instrument, seen = poll(
+        lambda _n, reply: (0.0, reply), lambda i: i.counters.readings > 20, timeout=2.0
+    )
     assert seen == {12345}
     assert instrument.latest.value == pytest.approx(123.45)
     assert instrument.counters.timeouts == 0
