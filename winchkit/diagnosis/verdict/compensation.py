@@ -101,6 +101,8 @@ def with_compensations(
             what = f"a torque constant that is wrong by {100 * (factor - 1):+.1f} %"
             for place in torque:
                 out[place] = _doubted(out[place], "factor", what, len(torque))
+    if not any(step.curve for step in out):
+        return tuple(out)
     weights = result.noise.inverse_sigma(engine.regression)
     changes = [weights * change_by(engine.regression, result.final, at[place]) for place in at]
     return beside_unknown(out, [terms[at[place]].effect.outputs for place in at], changes)
