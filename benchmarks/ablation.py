@@ -104,7 +104,6 @@ RULES: Mapping[str, Mapping[str, Any]] = {
     "overdispersion": {"verdict.equivalence.overdispersed": lambda _, __, noise: noise},
     "waves of one load": {"verdict.equivalence._waves_of_one_load": _no},
     "beside another": {"verdict.equivalence._beside_another": _no},
-    "listed as confusable": {"verdict.equivalence._is_listed": _no},
     "adds nothing": {"verdict.equivalence._adds_nothing": _no},
     "coarse fits": {"selection.time_series.TimeSeriesSelection.coarse_problem": _nothing},
 }

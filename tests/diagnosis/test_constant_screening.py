@@ -1,10 +1,14 @@
-"""The design of benchmarks/constant_screening.py: levels, constants, associations."""
+"""The design of benchmarks/constant_screening.py: levels, constants, associations; and the rules of
+benchmarks/ablation.py."""
 
 from __future__ import annotations
+
+import pkgutil
 
 import numpy as np
 import pytest
 
+from ablation import HOUSE, RULES
 from constant_screening import associations, rules_of_thumb, scaled, set_constants, value_of
 from winchkit.diagnosis.selection import acceptance
 from winchkit.diagnosis.verdict import laws
@@ -50,3 +54,8 @@ def test_the_constant_that_changes_answers_comes_first() -> None:
     found = associations(names, levels, [0.4 if upper[17] else 0.05 for upper in levels])
     assert found[0]["constant"] == "a.py _C17"
     assert found[0]["difference"] == pytest.approx(0.35)
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_every_rule_of_the_ablation_is_a_part_of_the_diagnosis(rule: str) -> None:
+    assert all(callable(pkgutil.resolve_name(f"{HOUSE}.{target}")) for target in RULES[rule])
