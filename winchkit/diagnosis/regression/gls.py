@@ -262,26 +262,22 @@ def fit_from(
     target: RequiredChiSquare | None = None,
     *,
     aim: float | None = None,
-    optimum: bool = False,
 ) -> Fit:
     """Fit from several starting values and keep the smallest χ².
 
     ``problem`` is the coarse regression on which the best starting values are found. Of more than
     two starts only the two best after eight iterations are fitted to the end. The fit is abandoned
-    at the optimum of the coarse regression, or at starting values that are an ``optimum`` found
-    before, and on the way, if the χ² ``target`` is out of reach; ``aim`` is the χ² that decides on
-    the fit, by default the target's.
+    at the optimum of the coarse regression, and on the way, if the χ² ``target`` is out of reach;
+    ``aim`` is the χ² that decides on the fit, by default the target's.
     """
-    found = list(starts) if optimum else None
-    if problem is not None:
-        found = starts_from_coarse_fits(regression, starts, inverse_sigma, problem)
-    if found is not None and target is not None:
+    found = problem and starts_from_coarse_fits(regression, starts, inverse_sigma, problem)
+    if found and target is not None:
         first = evaluated(regression, found[0], inverse_sigma)
         if target.is_out_of_reach(first.chi_square, first.n_unknowns):
             return first
     if aim is None:
         aim = np.inf if target is None else target.chi_square
-    if found is not None and problem is not None:
+    if found:
         best = _best(regression, found, inverse_sigma, _ITERATIONS, aim=aim)[0]
     else:
         best = _first_fits(regression, starts, inverse_sigma, aim=aim)[0]

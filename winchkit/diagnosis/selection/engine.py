@@ -9,7 +9,7 @@ are :class:`~winchkit.diagnosis.selection.time_series.TimeSeriesSelection` for a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
@@ -69,28 +69,6 @@ class FittedCandidate:
     criterion: float
 
 
-def _key(hypothesis: Hypothesis, law: Effect, item: Score) -> Hashable:
-    """Key of a candidate's stored optimum: effects beside it, its free unknowns, its shape."""
-    return (
-        *_effects_of(hypothesis),
-        law.id,
-        Coordinates(law).names,
-        *item.candidate.shape.items(),
-    )
-
-
-def _effects_of(hypothesis: Hypothesis) -> tuple[Hashable, ...]:
-    """Effects of a hypothesis with their free unknowns and orders."""
-    return tuple(
-        (
-            t.effect.id,
-            Coordinates(t.effect).names,
-            *(t.values[p.name] for p in t.effect.parameters if p.whole),
-        )
-        for t in hypothesis.terms
-    )
-
-
 class SelectionEngine(ABC):
     """Candidates, signatures and comparisons that stay the same through a selection.
 
@@ -113,9 +91,7 @@ class SelectionEngine(ABC):
         self.on_trial: Callable[[str], None] = lambda effect: None
         self.on_step: Callable[[Fit, BandNoise], bool] = lambda fitted, noise: False
         self.delays_wait = False
-        self._optima: dict[Hashable, Hypothesis] = {}
         self._refits: list[tuple[Hypothesis, BandNoise, float, Fit]] = []
-        self._refitted: dict[Hashable, Hypothesis] = {}
         self._extend_grids(initial_model)
         self.signatures = self._signatures(initial_model)
 
@@ -282,7 +258,6 @@ class SelectionEngine(ABC):
         item: Score,
         noise: BandNoise,
         *,
-        all_starts: bool = False,
         target: float | None = None,
         aim: float | None = None,
     ) -> FittedCandidate:
@@ -290,7 +265,7 @@ class SelectionEngine(ABC):
 
         Of a series law one coefficient after another is added as long as the criterion decreases.
         The trial is abandoned where the χ² ``target`` is out of reach, and its fit ends where the
-        smaller ``aim`` is; a repeated trial starts from its last values, unless ``all_starts``.
+        smaller ``aim`` is.
         """
         goal = None if target is None else RequiredChiSquare(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
@@ -301,32 +276,19 @@ class SelectionEngine(ABC):
                 hypothesis = hypothesis.without(index)
         best: FittedCandidate | None = None
         for law in truncated_series(effect):
-            key = _key(hypothesis, law, item)
-            if not all_starts and key in self._optima:
-                fitted = fit_from(
-                    self.regression,
-                    [self._optima[key]],
-                    inverse_sigma,
-                    target=goal,
-                    aim=aim,
-                    optimum=True,
-                )
+            if best is None:
+                own = replace(item, candidate=item.candidate.with_law(law))
+                starts = self._starts(hypothesis, own)
             else:
-                if best is None:
-                    own = replace(item, candidate=item.candidate.with_law(law))
-                    starts = self._starts(hypothesis, own)
-                else:
-                    starts = [best.fit.hypothesis.with_law(law)]
-                fitted = fit_from(
-                    self.regression,
-                    starts,
-                    inverse_sigma,
-                    self._coarse_problem(starts, noise),
-                    goal,
-                    aim=aim,
-                )
-            if not all_starts:
-                self._optima[key] = fitted.hypothesis
+                starts = [best.fit.hypothesis.with_law(law)]
+            fitted = fit_from(
+                self.regression,
+                starts,
+                inverse_sigma,
+                self._coarse_problem(starts, noise),
+                goal,
+                aim=aim,
+            )
             longer = FittedCandidate(fitted, self._criterion_of_trial(fitted))
             if best is not None and not longer.criterion < best.criterion:
                 break
@@ -366,24 +328,13 @@ class SelectionEngine(ABC):
         return self.criterion(fitted)
 
     def refit(self, hypothesis: Hypothesis, noise: BandNoise, aim: float = np.inf) -> Fit:
-        """Fit a hypothesis under a given noise, from the last values of the same effects where
-        these fit better; the fit ends where the χ² ``aim`` is out of reach.
-        """
+        """Fit a hypothesis under a given noise; it ends where the χ² ``aim`` is out of reach."""
         for known, under, aimed, fitted in self._refits:
-            if under is noise and known == hypothesis and aimed >= aim:
+            if under is noise and known == hypothesis and aimed == aim:
                 return fitted
-        inverse_sigma, effects = noise.inverse_sigma(self.regression), _effects_of(hypothesis)
-        starts, problem = [hypothesis], self._coarse_problem([hypothesis], noise)
-        before = self._refitted.get(effects)
-        if before is not None:
-            chi_square = [
-                float(np.sum((self.regression.residual(start) * inverse_sigma) ** 2))
-                for start in (before, hypothesis)
-            ]
-            if chi_square[0] <= chi_square[1]:
-                starts, problem = [before], None
-        fitted = fit_from(self.regression, starts, inverse_sigma, problem, aim=aim)
-        self._refitted[effects] = fitted.hypothesis
+        inverse_sigma = noise.inverse_sigma(self.regression)
+        problem = self._coarse_problem([hypothesis], noise)
+        fitted = fit_from(self.regression, [hypothesis], inverse_sigma, problem, aim=aim)
         self._refits = [(hypothesis, noise, aim, fitted), *self._refits[: _KEPT_REFITS - 1]]
         return fitted
 

@@ -62,9 +62,7 @@ class RivalPlace:
         limit = target + _MARGIN * (self.base.chi_square - target)
         if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
-        second_trial = self._engine.trial(
-            held, rival_beside, self._noise, all_starts=True, target=least, aim=aim
-        )
+        second_trial = self._engine.trial(held, rival_beside, self._noise, target=least, aim=aim)
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
         )
