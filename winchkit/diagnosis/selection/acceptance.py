@@ -11,6 +11,7 @@ import numpy as np
 
 from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import (
+    CERTAIN,
     held_out,
     held_out_rms,
     signed_rank_p_value,
@@ -36,14 +37,31 @@ RELEVANT_RATIO = 0.98
 def best_accepted(
     engine: SelectionEngine, present: Fit, noise: BandNoise, trials: list[FittedCandidate]
 ) -> Fit | None:
-    """Fit of the best trial that is accepted; None where none is."""
+    """Fit of the best trial that is accepted; None where none is.
+
+    Of nested laws the simplest enters first that explains nine tenths as much: a richer one may
+    imitate what another effect does, and takes its place later where it is needed.
+    """
     before = engine.criterion(present)
-    for trial in sorted(trials, key=lambda t: t.criterion):
-        if trial.fit.abandoned:
-            continue
-        if trial.criterion < before - MIN_GAIN and is_accepted(engine, present, trial.fit, noise):
+    accepted = (
+        trial
+        for trial in sorted(trials, key=lambda t: t.criterion)
+        if not trial.fit.abandoned
+        and trial.criterion < before - MIN_GAIN
+        and is_accepted(engine, present, trial.fit, noise)
+    )
+    best = next(accepted, None)
+    if best is None:
+        return None
+    simpler = best.fit.hypothesis.terms[-1].effect.reduces_to
+    enough = (1.0 - CERTAIN) * (present.chi_square - best.fit.chi_square)
+    for trial in accepted:
+        if (
+            trial.fit.hypothesis.terms[-1].effect.id in simpler
+            and present.chi_square - trial.fit.chi_square > enough
+        ):
             return trial.fit
-    return None
+    return best.fit
 
 
 def is_accepted(
