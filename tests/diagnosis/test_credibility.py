@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from diagnosis_runs import Ride, engine_for, term
+from diagnosis_runs import SPIRAL, Ride, engine_for, made, term
 from winchkit.diagnosis.credibility import (
     asymmetric_friction,
+    miscounted_turns,
     oversized,
     short_record,
     unresolved_order,
@@ -139,3 +142,20 @@ def test_a_gain_beside_friction_of_the_load_may_be_its_asymmetry(
             hypothesis = hypothesis.with_term(own, engine.regression.n_runs)
         reason = asymmetric_friction(engine.regression, engine.fixed(hypothesis, noise), 0)
         assert (reason is not None) == (doubted and small)
+
+
+@pytest.mark.parametrize(("turns", "counted"), [(3.0, "3 instead of 6"), (0.2, ""), (8.0, "")])
+def test_a_radius_wrong_by_whole_layers_may_be_turns_that_were_not_counted(
+    turns: float, counted: str
+) -> None:
+    """The same closed form: r + n g is the radius with n turns below; more than 6 are not there."""
+    drum = replace(SPIRAL.drum, kind="archimedean", layer_growth=0.003)
+    profile = replace(SPIRAL, drum=drum, reference=replace(SPIRAL.reference, wound_turns=6.0))
+    engine = selection_engine(prepare([made(profile=profile)], profile), load_catalogue())
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    error = term("drum-radius", radius_error=-0.003 * turns)
+    reason = miscounted_turns(
+        engine.regression, engine.fixed(engine.initial_model.with_term(error, 1), noise), 0
+    )
+    assert (reason or "")[: len(counted)] == counted
+    assert bool(reason) == bool(counted)

@@ -20,6 +20,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.effect import Effect
 from winchkit.effects.series import orders_of
+from winchkit.model.drum import Archimedean, Spiral, drum_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.quantity_text import quantity
 
@@ -29,6 +30,8 @@ it; rule of thumb: a balancer cancels most of a weight."""
 _LEAST_TRAVEL = 0.5
 """Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
 (h²/6 for half a range h): any smooth law fits there."""
+_LEAST_TURNS = 0.5
+"""Turns below which a wrong number of turns on the drum is no explanation: they are counted."""
 _STANDSTILL = 0.01
 """Share of the highest speed below which the axis is not in motion."""
 _LEAST_RESOLVED = 0.5
@@ -76,6 +79,25 @@ def short_record(regression: Regression, fit: Fit, index: int) -> str | None:
     return (
         f"the axis turned by {np.degrees(travel):.2g}° only, over which any smooth law is a "
         "straight line"
+    )
+
+
+def miscounted_turns(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether a wrong radius is that of another number of turns on the drum, in words.
+
+    Turns that are missing at the reference change the radius of every layer by as many layers.
+    """
+    error = fit.hypothesis.terms[index].values.get("radius_error")
+    if error is None or not isinstance(regression, TimeSeriesRegression):
+        return None
+    profile = regression.dataset.profile
+    drum, wound = drum_of(profile), profile.reference.wound_turns
+    growth = drum.growth if isinstance(drum, Spiral | Archimedean) else 0.0
+    if not growth or not _LEAST_TURNS <= abs(turns := error / growth) <= max(wound, 1.0):
+        return None
+    return (
+        f"{wound + turns:.3g} instead of {wound:.3g} turns on the drum at the reference change the "
+        "same: count them"
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from winchkit.diagnosis.credibility import (
     asymmetric_friction,
+    miscounted_turns,
     oversized,
     short_record,
     unresolved_order,
@@ -196,6 +197,7 @@ _SERIOUS = frozenset(
         "reversal",
         "asymmetry",
         "unresolved",
+        "turns",
     }
 )
 """Doubts with which no step is certain."""
@@ -233,6 +235,7 @@ def _doubts(
         ("short-record", short_record),
         ("asymmetry", asymmetric_friction),
         ("unresolved", unresolved_order),
+        ("turns", miscounted_turns),
     ):
         if reason := check(regression, result.final, index):
             out.append(Doubt(code, reason))

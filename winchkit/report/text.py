@@ -12,7 +12,7 @@ from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import Attribution
-from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
+from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset, Step
 from winchkit.effects.card import sparkline
 from winchkit.effects.effect import parameter_name
 from winchkit.effects.placement import HOME
@@ -170,11 +170,21 @@ def step_lines(
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
         if most is not None and lines and (step in small or len(lines) + len(own) > most):
-            left_out = [diagnosis.steps[one].effects[0] for one in told[number - 1 :]]
-            more = f"… {len(left_out)} more with --verbose: {', '.join(left_out)}"
-            return [*lines, *paragraph(more, "", "  ")]
+            left_out = [diagnosis.steps[one] for one in told[number - 1 :]]
+            return [*lines, *paragraph(_named_only(left_out, small), "", "  ")]
         lines += own
     return lines
+
+
+def _named_only(left_out: Sequence[Step], small: Sequence[Step]) -> str:
+    """Steps that ``--verbose`` shows; the small ones apart, which the headline does not count."""
+    large = [step for step in left_out if step not in small]
+    parts = (
+        (f"{len(large)} more with --verbose", large),
+        ("doubtful and under 1 % each", [step for step in left_out if step in small]),
+    )
+    words = [f"{what}: {', '.join(s.effects[0] for s in own)}" for what, own in parts if own]
+    return f"… {'; '.join(words)}"
 
 
 def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:

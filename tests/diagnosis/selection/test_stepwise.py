@@ -1,13 +1,14 @@
-"""Candidates that selection may try."""
+"""Candidates that selection may try, and which of nested ones enters first."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, engine_for, made, term
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.search import selection_engine
+from winchkit.diagnosis.selection.stepwise import stepwise_selection
 from winchkit.effects.catalogue import Catalogue
 
 RIDE = Ride(samples=400)
@@ -50,3 +51,10 @@ def test_a_candidate_with_feasible_sign_scores() -> None:
     best = engine.scores(present, noise)[0]
     assert best.candidate.effect.id == "rotor-inertia"
     assert np.all(best.amplitudes > 0.0)
+
+
+def test_of_nested_laws_the_simplest_enters_first() -> None:
+    """Creep over half a minute with one reversal takes a part of the friction for a wrong gain."""
+    hidden = (term("pulley-coulomb", friction=0.0085), term("cell-gain", gain_error=-0.028))
+    engine = engine_for(hidden, Ride(samples=1500, period=50.0), (57.0, 20.0))
+    assert set(stepwise_selection(engine).final.labels) == {"pulley-coulomb", "cell-gain"}

@@ -111,18 +111,31 @@ def test_a_refitted_value_has_that_of_the_file_in_the_same_unit() -> None:
     assert step_title(REFITTED) == "axial stiffness 250 kN instead of 100 kN in the profile"
     small = replace(REFITTED, file_values={"axial_stiffness": 900.0})
     assert step_text(small) == (
-        "the cable is elastic: axial stiffness 249.9 ± 7.0 kN instead of 0.900 kN in the profile; "
-        "explains 90 %"
+        "elongation of the cable: axial stiffness 249.9 ± 7.0 kN instead of 0.900 kN in the "
+        "profile; explains 90 %"
     )
 
 
 def test_refitted_values_are_counted_apart_from_missing_effects() -> None:
     old, new = replace(REFITTED, effects=("motor-viscous",)), FRICTION
-    assert cause([old, new], {}).startswith("the pulleys have Coulomb friction or ")
-    assert cause([old, new], {}).endswith("; 1 effect of the profile has other values")
-    assert cause([old, old, new, new], {}).startswith(
+    assert cause([new, old], {}).startswith("the pulleys have Coulomb friction or ")
+    assert cause([new, old], {}).endswith("; 1 effect of the profile has other values")
+    assert cause([new, new, old, old], {}).startswith(
         "2 effects are missing; first, the pulleys have"
     )
+
+
+def test_what_explains_most_comes_first_in_the_headline() -> None:
+    first = "axial stiffness 250 kN instead of 100 kN in the profile; the pulleys have Coulomb"
+    assert cause([REFITTED, FRICTION], {}).startswith(first)
+
+
+def test_values_that_print_alike_are_left_out_beside_others() -> None:
+    moved = _friction_refitted(0.019996, 0.000077, 0.5)
+    assert step_title(moved) == "transition 0.199 rad/s instead of 0 rad/s in the profile"
+
+
+def test_many_refitted_values_are_counted() -> None:
     assert cause([REFITTED, REFITTED], {}) == (
         "2 effects of the profile have other values; first, axial stiffness 250 kN instead of 100 "
         "kN in the profile"
@@ -180,7 +193,9 @@ def test_a_refit_that_differs_or_explains_something_is_reported(
     step = _friction_refitted(torque, 0.000077, share)
     diagnosis = diagnosis_of("explained", step, replace(ELASTIC, share=0.98))
     assert sorted(reported_steps(diagnosis)) == [0, 1]
-    assert headline(diagnosis).endswith("; 1 effect of the profile has other values")
+    first = diagnosis.steps[reported_steps(diagnosis)[0]]
+    said = "instead of" if first.refitted else "; 1 effect of the profile has other values"
+    assert said in headline(diagnosis)
 
 
 def test_a_refit_alone_is_reported_where_it_makes_the_verdict() -> None:

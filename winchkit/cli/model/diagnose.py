@@ -28,7 +28,7 @@ from winchkit.cli.model.options import (
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer, WinchAnswer
-    from winchkit.diagnosis.results import Diagnosis
+    from winchkit.diagnosis.results import Diagnosis, Step
     from winchkit.report.figures.figure import Figure
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
@@ -158,11 +158,23 @@ def _suggest(
         suggest_next("calibrate", asked.profile, runs, "-o", file)
     elif diagnosis.verdict == "unknown" and diagnosis.data == "runs":
         suggest_next("effects", "new", "own.py", "--fit", runs, *words)
-    elif first is not None and len(first.effects) == 1:
-        file = extended_name(asked.profile, first.effects[0])
-        suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
+    elif first is not None and (effect := _added(first)):
+        suggest_next(
+            "add", effect, "--fit", runs, *words, "-o", extended_name(asked.profile, effect)
+        )
     elif not isinstance(declared, AxisProfile):
         suggest_with("plan", asked, runs)
+
+
+def _added(step: Step) -> str:
+    """Effect that a step adds, with an open law the curve over its variable; empty for a set."""
+    from winchkit.effects.empirical import EMPIRICAL, empirical_id, shown_id
+
+    outputs, variable = {place.output for place in step.place}, step.curve.replace(" ", "_")
+    for output in outputs if len(outputs) == 1 else ():
+        if empirical_id(output, variable) in EMPIRICAL:
+            return shown_id(output, variable)
+    return step.effects[0] if len(step.effects) == 1 else ""
 
 
 def _mending(diagnosis: Diagnosis) -> str:

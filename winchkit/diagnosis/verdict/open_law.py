@@ -132,11 +132,11 @@ def _better(
     reaches = lacking and not _is_above(errors[2 + best], size)
     if explained <= 0.0 or (gained <= MARGIN * explained and not reaches):
         return None
-    more = (
-        f"explains {percent(gained / explained)} more"
-        if gained > MARGIN * explained
-        else "reaches the noise, which this law does not"
-    )
+    more = "reaches the noise, which this law does not"
+    if gained > explained:
+        more = f"explains {1 + gained / explained:.2g} times as much"
+    elif gained > MARGIN * explained:
+        more = f"explains {percent(gained / explained)} more"
     curve = found[best]
     return OpenLaw(curve, f"a free curve over {curve.words} {more}: the law is another one")
 

@@ -33,6 +33,10 @@ _COARSE_KNOTS = (6, 12)
 """Knots of coarse linear splines; screened; varied."""
 _POWERS = (1.5, 2.0, 3.0)
 """Powers of the speed; rule of thumb; varied."""
+_ORDERS = (1, 2, 3)
+"""Highest order of a curve over one turn; rule of thumb: of bearings, seals and brakes."""
+_TURN = " in its turn"
+"""After the name of an angle, of which only the place in its turn counts."""
 _EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
 """Variables over which the catalogue has every curve already, or that are tried in a product; the
 angle of an axis, which has no cable length, is its position."""
@@ -79,18 +83,15 @@ def curves(
 ) -> Iterator[CurveFamily]:
     """Families of curves that change one of ``outputs``; ``only`` those of a place and variable."""
     recordings = regression.dataset.recordings
-    known = [
-        variables_of(recording) | {"direction": recording.smooth.at.direction}
-        for recording in recordings
-    ]
+    known = [_with_factors(recording) for recording in recordings]
     position = "cable_length" if "cable_length" in known[0] else "motor_angle"
-    names = [
+    names = [name for name in known[0] if all(name in other for other in known)]
+    alone = [
         name
-        for name in known[0]
-        if (name == position or name not in _EXCLUDED_VARIABLES)
-        and all(name in other for other in known)
+        for name in names
+        if name == position or not (name in _EXCLUDED_VARIABLES or name.endswith(_TURN))
     ]
-    for factor, name in (*((None, n) for n in names), *_products(names, position)):
+    for factor, name in (*((None, n) for n in alone), *_products(names, position)):
         variable = name if factor is None else f"{factor} times {name}"
         if only is not None and not any((place, variable) in only for place in PLACES):
             continue
@@ -113,19 +114,31 @@ def curves(
                 yield CurveFamily(place, variable, laws, knots, basis)
 
 
+def _with_factors(recording: Recording) -> dict[str, Array]:
+    """Variables of a run with those of products: the direction, and angles in their turn."""
+    out = variables_of(recording)
+    turns = {name + _TURN: np.mod(out[name], 2 * np.pi) for name in ANGLES if name in out}
+    return out | turns | {"direction": recording.smooth.at.direction}
+
+
 def _products(names: Sequence[str], position: str) -> list[tuple[str, str]]:
-    """Products of a factor and a curve: friction by place or load, compliant cables. The direction
-    is the expected one of the model: how steep it is, is not tested.
+    """Products of a factor and a curve: friction by place, by place in a turn, by load, by load and
+    speed, or by time; compliant cables. The direction is the expected one of the model: how steep
+    it is, is not tested.
     """
     force = "load" if "load" in names else "tension"
     pairs = (
+        *(("direction", name + _TURN) for name in ANGLES),
+        (force, "speed"),
+        ("direction", "time"),
+        ("speed", "time"),
         ("direction", position),
         ("direction", force),
         (force, "cable_length"),
         ("cable_length", force),
         (force, "temperature"),
     )
-    return [pair for pair in pairs if set(pair) <= {"direction", *names}]
+    return [pair for pair in pairs if set(pair) <= set(names)]
 
 
 def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
@@ -149,6 +162,8 @@ def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
     factor has a level of its own (``level``): any other is an offset, for which the catalogue has
     effects.
     """
+    if name.endswith(_TURN):
+        return [(_waves(knots, order), 1 + 2 * order) for order in _ORDERS]
     z = np.linspace(-1.0, 1.0, len(knots))
     out: list[Law] = []
     for degree in _DEGREES:
@@ -162,6 +177,12 @@ def laws_over(knots: Array, name: str, *, level: bool) -> list[Law]:
     if name == "speed":
         out += [((np.sign(knots) * np.abs(knots) ** n)[:, None], 2) for n in _POWERS]
     return out
+
+
+def _waves(angle: Array, orders: int) -> Array:
+    """Constant, cosine and sine up to an order of a turn, (angles, 1 + 2 orders)."""
+    waves = [wave(k * angle) for k in range(1, orders + 1) for wave in (np.cos, np.sin)]
+    return np.column_stack([np.ones_like(angle), *waves])
 
 
 def _direct_change(recording: Recording, basis: Array, knots: Array) -> Array:

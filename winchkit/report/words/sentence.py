@@ -107,12 +107,12 @@ def error_text(diagnosis: Diagnosis) -> str:
     opening = "With them" if others else f"With {found}"
     if others and len(small := named_only(steps, outputs)) == len(others):
         opening = f"With {found} and {len(small)} smaller effect{'s' if len(small) > 1 else ''}"
-    if diagnosis.verdict == "unknown":
-        opening = f"With the effect{'s' if others else ''} found"
     if not others and all(is_wrong_value(effect) for effect in first.effects):
         opening = "Corrected" if count == 1 else f"With {found} corrected"
     if all(step.refitted for step in steps):
         opening = "Corrected"
+    if diagnosis.verdict == "unknown":
+        opening = f"With the effect{'s' if others else ''} found"
     return gain_text(outputs, opening, most=1) or _NO_GAIN
 
 

@@ -13,6 +13,7 @@ from winchkit.effects.transition import TRANSITION
 from winchkit.quantity_text import percent, scale_for, significant, with_std
 from winchkit.report.words.vocabulary import (
     clause,
+    effect_name,
     error_scale,
     kind,
     listed,
@@ -108,18 +109,22 @@ def _agrees(estimate: Estimate, file_value: float) -> bool:
 def cause(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> str:
     """What is missing, as the headline of a diagnosis with steps; without a full stop."""
     added = [step for step in steps if not step.refitted]
-    refitted = len(steps) - len(added)
-    first = step_title((added or steps)[0])
+    refitted = [step for step in steps if step.refitted]
     if len(steps) == 1:
-        return first
-    if not added:
-        return f"{refitted} effects of the profile have other values; first, {first}"
-    count = len(added) - len(named_only(steps, outputs))
-    text = first if count <= 1 else f"{count} effects are missing; first, {first}"
+        return step_title(steps[0])
+    count, parts = len(added) - len(named_only(steps, outputs)), []
+    if added:
+        first = step_title(added[0])
+        parts.append(first if count <= 1 else f"{count} effects are missing; first, {first}")
     if refitted:
-        have = "effect of the profile has" if refitted == 1 else "effects of the profile have"
-        text += f"; {refitted} {have} other values"
-    return text
+        first, many = step_title(refitted[0]), len(refitted)
+        have = "effect of the profile has" if many == 1 else "effects of the profile have"
+        others = f"{many} {have} other values"
+        if not steps[0].refitted:
+            parts.append(others)
+        else:
+            parts.insert(0, first if many == 1 else f"{others}; first, {first}")
+    return "; ".join(parts)
 
 
 def step_title(step: Step) -> str:
@@ -203,7 +208,7 @@ def _titled_values(step: Step) -> str:
         return _WHOLE
     if step.refitted:
         changed = _refitted_values(step, with_errors=True)
-        return f"{clause(step.effects[0])}: {changed} in the profile"
+        return f"{effect_name(step.effects[0])}: {changed} in the profile"
     values = {e: values_text(step.parameters.get(e, {})) for e in kinds_of(step)}
     if has_other_law(step) or len(values) == 1:
         return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)
@@ -219,8 +224,8 @@ def kinds_of(step: Step) -> list[str]:
 
 
 def _refitted_values(step: Step, *, with_errors: bool) -> str:
-    """``axial stiffness 300 kN instead of 100 kN``."""
-    out = []
+    """``axial stiffness 300 kN instead of 100 kN``; values that print alike only where all do."""
+    out, alike = list[str](), list[str]()
     for name, estimate in step.parameters.get(step.effects[0], {}).items():
         if name not in step.file_values:
             continue
@@ -228,8 +233,9 @@ def _refitted_values(step: Step, *, with_errors: bool) -> str:
         scale = scale_for((estimate.value, old), estimate.unit)
         std = estimate.std if with_errors else float("nan")
         new = with_std(estimate.value, std, estimate.unit, scale)
-        out.append(f"{name.replace('_', ' ')} {new} instead of {scale.text(old)}")
-    return listed(out)
+        changed = f"{name.replace('_', ' ')} {new} instead of {scale.text(old)}"
+        (alike if scale.text(estimate.value) == scale.text(old) else out).append(changed)
+    return listed(out or alike)
 
 
 def _open_law(step: Step) -> str:
