@@ -21,6 +21,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "gear-ratio": {"ratio_error": ("1", 0)},
     "layer-thickness": {"thickness_error": ("m", 0)},
     "drum-eccentricity": {"eccentricity": ("m", 0), "phase": ("rad", SHAPE)},
+    "drum-roundness": {"amplitude": ("m", 0), "phase": ("rad", SHAPE), "lobes": ("1", SHAPE)},
     "gear-backlash": {"gap": ("rad", 0), "held": ("1", 1)},
     "gear-transmission-error": {
         "amplitude": ("rad", 0),
@@ -178,7 +179,7 @@ def test_words_are_complete(effect: Effect) -> None:
     for name in effect.contains:
         assert effect.family
         assert CATALOGUE[name].family == effect.family
-    assert effect.repeatable == any(p.whole for p in effect.parameters)
+    assert effect.repeatable == any(p.whole and p.name == "order" for p in effect.parameters)
     if effect.polar:
         size, phase = map(effect.parameter, effect.polar)
         assert size.low == 0.0

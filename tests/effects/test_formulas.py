@@ -188,6 +188,12 @@ def _eccentricity() -> dict[str, np.ndarray]:
     return {"cable_length": X.free - wave, "motor_torque": X.T * (X.arm + slope)}
 
 
+def _roundness() -> dict[str, np.ndarray]:
+    wave = 3e-4 * (np.sin(2 * X.phi - 0.7) + sin(0.7))
+    slope = 6e-4 * np.cos(2 * X.phi - 0.7) / RATIO
+    return {"cable_length": X.free - wave, "motor_torque": X.T * (X.arm + slope)}
+
+
 def _transmission_error() -> dict[str, np.ndarray]:
     phi = X.phi + 3e-4 * np.sin(3 * X.theta + 0.4)
     slope = 1 / RATIO + 9e-4 * np.cos(3 * X.theta + 0.4)
@@ -218,6 +224,7 @@ CASES: dict[str, Case] = {
     "gear-ratio": ({"ratio_error": 0.01}, _ratio_error),
     "layer-thickness": ({"thickness_error": -2e-4}, _thickness_error),
     "drum-eccentricity": ({"eccentricity": 3e-4, "phase": 0.7}, _eccentricity),
+    "drum-roundness": ({"amplitude": 3e-4, "phase": 0.7, "lobes": 2}, _roundness),
     "gear-backlash": ({"gap": 0.01, "held": 0.0}, _backlash),
     "gear-transmission-error": ({"amplitude": 3e-4, "phase": 0.4, "order": 3}, _transmission_error),
     "encoder-slip": (

@@ -129,6 +129,60 @@ DRUM_ECCENTRICITY = Effect(
     on_robot=frozenset({"one"}),
 )
 
+
+def _drum_roundness(path: Path, at: At, values: Values) -> Path:
+    """Wound length plus a (sin(kφ − p) + sin p), and its derivative."""
+    size, lobes, phase = values["amplitude"], values["lobes"], values["phase"]
+    turned = lobes * at.drum_angle - phase
+    return Path(
+        path.value + size * (np.sin(turned) + np.sin(phase)),
+        path.slope + size * lobes * np.cos(turned),
+    )
+
+
+DRUM_ROUNDNESS = Effect(
+    id="drum-roundness",
+    stage=Stage.WOUND,
+    parameters=(
+        Parameter(
+            "amplitude",
+            "m",
+            null=0.0,
+            typical=2e-4,
+            low=0.0,
+            high=0.02,
+            plausible=Plausible(
+                0.0,
+                0.1,
+                "a drum that is out of round by a tenth of its radius is no drum",
+                of="drum.winding_radius",
+            ),
+        ),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+        Parameter(
+            "lobes",
+            "1",
+            null=2.0,
+            typical=2.0,
+            low=2.0,
+            high=12.0,
+            role="shape",
+            grid=(2.0, 3.0, 4.0),
+            whole=True,
+        ),
+    ),
+    apply=_drum_roundness,
+    outputs=("cable_length", "motor_torque"),
+    variable="drum_angle",
+    what="The drum is out of round: oval, or with three or more lobes.",
+    formula="W + a (sin(k φ − p) + sin p), k lobes per drum turn",
+    source="ISO 12181-1, roundness: undulations per revolution; first order in a",
+    looks_like="A sine two or more times per drum turn, in torque in proportion to the load.",
+    confused_with=("drum-eccentricity", "gear-transmission-error"),
+    told_apart="Two loads: the torque's sine grows with the load. A ratio that is not whole.",
+    polar=("amplitude", "phase"),
+)
+
 _TURN = 2 * np.pi
 
 

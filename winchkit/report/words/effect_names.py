@@ -41,6 +41,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "the zero of the load cell depends on the temperature",
     ),
     "drum-eccentricity": ("runout of the drum", "the drum has runout"),
+    "drum-roundness": ("roundness of the drum", "the drum is out of round"),
     "drum-unbalance": ("unbalance of the drum", "the drum is unbalanced"),
     "drum-radius": ("winding radius of the drum", "the winding radius of the drum is wrong"),
     "exit-point": (
