@@ -107,6 +107,32 @@ LOAD_LEVER = Effect(
 )
 
 
+def _load_coulomb(tension: Array, at: At, values: Values) -> Array:
+    return tension + values["force"] * cable_direction(at, values)
+
+
+LOAD_COULOMB = Effect(
+    id="load-coulomb",
+    stage=Stage.CABLE_WEIGHT,
+    parameters=(
+        Parameter("force", "N", null=0.0, typical=2.0, low=0.0, high=1e7),
+        CABLE_TRANSITION,
+    ),
+    apply=_load_coulomb,
+    outputs=("tension", "motor_torque"),
+    part="load",
+    variable="direction",
+    what="The load rubs in its guide, or the cable in a seal, with a force that is constant.",
+    formula="T + s F",
+    source="Coulomb friction of a linear guide",
+    looks_like="Steps of tension and torque with the direction, alike under every load.",
+    confused_with=("pulley-coulomb", "pulley-capstan", "motor-coulomb"),
+    told_apart="Two loads, since that of a pulley grows with the load; the tension, in which "
+    "friction of the motor is not.",
+    needs=("load",),
+)
+
+
 def _load_friction_at_place(tension: Array, at: At, values: Values) -> Array:
     return tension + values["force"] * cable_direction(at, values) * window(at.free_length, values)
 
@@ -129,6 +155,7 @@ LOAD_FRICTION_AT_PLACE = Effect(
     apply=_load_friction_at_place,
     outputs=("tension", "motor_torque"),
     part="load",
+    reduces_to=("load-coulomb",),
     what="The load, or the cable before the last pulley, has more friction around one position.",
     formula="T + s F exp(−((ℓ − ℓ0)/w)²), ℓ the free length",
     source="Coulomb friction with a smooth window",
