@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.model.rotation import skew
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
@@ -42,6 +43,15 @@ def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
     for k in range(3):
         out[:, 3:, 1 + k] = np.cross(rotation[:, :, k], platform.mass * _DOWN) * platform.free[3:]
     return out
+
+
+def weight_by_rotation(platform: PlatformSpec, rotation: Array) -> Array:
+    """Derivative of :func:`gravity_wrench` by a small rotation vector in the base, (p, 6, 3)."""
+    lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
+    moment = platform.mass * skew(_DOWN) @ skew(lever)
+    return (
+        np.concatenate([np.zeros_like(moment), moment], axis=1) * np.asarray(platform.free)[:, None]
+    )
 
 
 def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:
