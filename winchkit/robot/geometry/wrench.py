@@ -49,9 +49,8 @@ def weight_by_rotation(platform: PlatformSpec, rotation: Array) -> Array:
     """Derivative of :func:`gravity_wrench` by a small rotation vector in the base, (p, 6, 3)."""
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     moment = platform.mass * skew(_DOWN) @ skew(lever)
-    return (
-        np.concatenate([np.zeros_like(moment), moment], axis=1) * np.asarray(platform.free)[:, None]
-    )
+    free = np.asarray(platform.free)[:, None]
+    return np.asarray(np.concatenate([np.zeros_like(moment), moment], axis=1) * free)
 
 
 def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:
