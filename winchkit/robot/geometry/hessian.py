@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.rotation import skew
+from winchkit.model.rotation import cross, skew
 from winchkit.robot.geometry.kinematics import Geometry, sensitivities, wrap_angle
 
 
@@ -63,7 +63,7 @@ def direction_change(geometry: Geometry, position: Array, rotation: Array) -> Di
     )
     away = np.where(distance > 1e-12, away, _any_square_to(axis))
     inplane = np.cos(wrap) * away - np.sin(wrap) * axis
-    across = np.cross(axis, away)
+    across = cross(axis, away)
     by_anchor = _outer(inplane) / free[..., None] + _outer(across) * side[..., None]
     return DirectionChange(unit, by_anchor, (1 - np.cos(wrap)) / free * inplane)
 
@@ -74,5 +74,5 @@ def _outer(vector: Array) -> Array:
 
 def _any_square_to(axis: Array) -> Array:
     other = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
-    square = np.cross(axis, other)
+    square = cross(axis, other)
     return np.asarray(square / np.linalg.norm(square, axis=1, keepdims=True))
