@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 from math import pi
 
 import numpy as np
@@ -32,6 +32,7 @@ ROPES, COUNT = 4, 60
 TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3
 
 
+@cache
 def truth() -> Truth:
     """The upper cables of the paper's robot, led to points above its platform."""
     whole = Truth()
@@ -41,7 +42,8 @@ def truth() -> Truth:
 
 def ropes(pose: Array) -> Array:
     x, y, z, *angles = pose.tolist()
-    return np.array([truth().length(i, (x, y, z), turn(*angles)) for i in range(ROPES)])
+    turned = turn(*angles)
+    return np.array([truth().length(i, (x, y, z), turned) for i in range(ROPES)])
 
 
 def height(pose: Array) -> float:
@@ -81,7 +83,7 @@ def at_rest(rng: np.random.Generator, count: int, reach: float) -> tuple[Array, 
     return home, np.array(poses), motor
 
 
-@lru_cache(maxsize=1)
+@cache
 def hanging() -> tuple[Robot, MeasuredPoses]:
     """The nominal robot, and measurements of the true one."""
     rng = np.random.default_rng(3)
