@@ -12,6 +12,7 @@ import pytest
 from command_line import done, invoke
 from winchkit import add, read_profile, write_run
 from winchkit.dynamics import refit
+from winchkit.dynamics.balance import Balance
 from winchkit.dynamics.comparison import simulated_errors
 from winchkit.dynamics.forward import Setup, motion_of
 from winchkit.dynamics.integration import SimulatedMotion
@@ -140,11 +141,11 @@ def test_no_point_is_simulated_twice(tmp_path: Path, monkeypatch: pytest.MonkeyP
     seen = []
 
     def counted(
-        profile: WinchProfile, terms: Sequence[Term], setup: Setup, tolerance: float
+        profile: WinchProfile, terms: Sequence[Term], setup: Setup, tolerance: float, law: Balance
     ) -> SimulatedMotion:
         values = tuple(value for term in terms for value in term.values.values())
         seen.append((*values, float(setup.time[0]), setup.angle, setup.speed))
-        return motion_of(profile, terms, setup, tolerance)
+        return motion_of(profile, terms, setup, tolerance, law)
 
     monkeypatch.setattr(refit, "motion_of", counted)
     fitted(tmp_path, 0.9, [recorded(1)])

@@ -9,7 +9,7 @@ import numpy as np
 
 from winchkit.arguments import number, positive, require_type
 from winchkit.arrays import Array
-from winchkit.dynamics.balance import balance, refuse_load
+from winchkit.dynamics.balance import Balance, balance, refuse_load
 from winchkit.dynamics.drives import RECORDED, Inputs, cascade
 from winchkit.dynamics.integration import Integrator, SimulatedMotion, holding_torque
 from winchkit.effects.bind import terms_of
@@ -162,11 +162,21 @@ def simulated(
     return Run(setup.name, motion.time, channels, metadata)
 
 
+def law_of(profile: WinchProfile, terms: Sequence[Term], setup: Setup) -> Balance:
+    """The balance under the load of a setup."""
+    return balance(profile, terms, setup.load_mass, is_load_known="load" in setup.inputs.signals)
+
+
 def motion_of(
-    profile: WinchProfile, terms: Sequence[Term], setup: Setup, tolerance: float = 1e-8
+    profile: WinchProfile,
+    terms: Sequence[Term],
+    setup: Setup,
+    tolerance: float = 1e-8,
+    law: Balance | None = None,
 ) -> SimulatedMotion:
-    """The motion of a setup, without the readings of the instruments."""
-    law = balance(profile, terms, setup.load_mass, is_load_known="load" in setup.inputs.signals)
+    """The motion of a setup, without the readings of the instruments; with the balance of its
+    profile, terms and load where it is known already."""
+    law = law or law_of(profile, terms, setup)
     drive, inputs = RECORDED, setup.inputs
     if "torque" in inputs.signals:
         made = inputs.signals["torque"]

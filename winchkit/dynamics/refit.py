@@ -27,10 +27,10 @@ from scipy.optimize import least_squares
 
 from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
-from winchkit.dynamics.balance import ON_MOTION, balance
+from winchkit.dynamics.balance import ON_MOTION, Balance, balance
 from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed
 from winchkit.dynamics.drives import Inputs
-from winchkit.dynamics.forward import Setup, driving_part, motion_of, setup_of
+from winchkit.dynamics.forward import Setup, driving_part, law_of, motion_of, setup_of
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
@@ -234,10 +234,13 @@ class _Shooting:
 
     def ends(self, terms: Sequence[Term], states: Array) -> list[tuple[Array, float]]:
         """Angle of every piece at its times, and its last speed."""
-        out = []
+        out, laws = [], dict[tuple[float | None, bool], Balance]()
         for piece, (angle, speed) in zip(self.pieces, states.tolist(), strict=True):
             setup = replace(piece.setup, angle=angle, speed=speed)
-            motion = motion_of(self.profile, terms, setup, _TOLERANCE)
+            load = setup.load_mass, "load" in setup.inputs.signals
+            if load not in laws:  # tracing the effects takes as long as a piece
+                laws[load] = law_of(self.profile, terms, setup)
+            motion = motion_of(self.profile, terms, setup, _TOLERANCE, laws[load])
             out.append((motion.angle, float(motion.speed[-1])))
         return out
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 from math import pi
 
 import numpy as np
@@ -21,7 +21,7 @@ from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.files.poses import MeasuredPoses
-from winchkit.robot.forces.balance import hanging_balance
+from winchkit.robot.forces.balance import hanging_balance, hanging_residual, wrench_scale
 from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.robot.mistakes.search import mistakes_in
 from winchkit.schema.profiles.robot import PriorSpec
@@ -32,6 +32,7 @@ ROPES, COUNT = 4, 60
 TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3
 
 
+@cache
 def truth() -> Truth:
     """The upper cables of the paper's robot, led to points above its platform."""
     whole = Truth()
@@ -41,7 +42,8 @@ def truth() -> Truth:
 
 def ropes(pose: Array) -> Array:
     x, y, z, *angles = pose.tolist()
-    return np.array([truth().length(i, (x, y, z), turn(*angles)) for i in range(ROPES)])
+    turned = turn(*angles)
+    return np.array([truth().length(i, (x, y, z), turned) for i in range(ROPES)])
 
 
 def height(pose: Array) -> float:
@@ -81,7 +83,7 @@ def at_rest(rng: np.random.Generator, count: int, reach: float) -> tuple[Array, 
     return home, np.array(poses), motor
 
 
-@lru_cache(maxsize=1)
+@cache
 def hanging() -> tuple[Robot, MeasuredPoses]:
     """The nominal robot, and measurements of the true one."""
     rng = np.random.default_rng(3)
@@ -253,6 +255,16 @@ def test_the_equilibrium_has_the_derivatives_of_its_residual() -> None:
     back = hanging_balance(nominal.geometry, moved_pose(pose, -step), measured.tension, platform)
     change = (there.residual - back.residual) / 2
     np.testing.assert_allclose((found.by_pose @ step[..., None])[..., 0], change, atol=1e-6)
+    geometry = nominal.geometry
+    for name in ("exit_point", "anchor_point", "swivel_radius"):
+        move = 1e-5 * rng.normal(size=getattr(geometry, name).shape)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = replace(geometry, **{name: getattr(geometry, name) + sign * move})
+            left = hanging_residual(moved, pose, measured.tension, platform)
+            ends.append(left / wrench_scale(moved))
+        change = wrench_scale(geometry) * (ends[0] - ends[1]) / 2
+        np.testing.assert_allclose(found.by_robot[name] @ move.ravel(), change, atol=1e-7)
 
 
 def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:

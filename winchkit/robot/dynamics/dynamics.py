@@ -28,7 +28,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.rotation import skew
+from winchkit.model.rotation import cross, skew
 from winchkit.model.stages import Signals
 from winchkit.robot.forces.force_distribution import ForceLimits, distributed_forces
 from winchkit.robot.geometry.kinematics import Pose
@@ -204,6 +204,6 @@ def _velocity_wrench(platform: PlatformSpec, rotation: Array, velocity: Array) -
     """Centripetal and gyroscopic terms h, (k, 6)."""
     spin = velocity[:, 3:]
     lever = rotation @ np.asarray(platform.center_of_mass, dtype=float)
-    force = platform.mass * np.cross(spin, np.cross(spin, lever))
+    force = platform.mass * cross(spin, cross(spin, lever))
     momentum = (_inertia(platform, rotation) @ spin[..., None])[..., 0]
-    return np.hstack([force, np.cross(lever, force) + np.cross(spin, momentum)])
+    return np.hstack([force, cross(lever, force) + cross(spin, momentum)])

@@ -12,7 +12,13 @@ balance its weight:
 
 with the rms distance ρ of the anchor points from the platform's origin, so that all rows are
 forces. They determine the tilt that the cables leave free, so that their derivatives by pose and
-geometry are needed: central differences of 1 µm and 1 µrad.
+geometry are needed. A cable with direction u from pulley to platform and lever arm a pulls with
+−f (u, a × u), of which the derivatives are
+
+    d(u) = U δ + u_r dr,      d(a × u) = a × d(u) − u × d(a)
+
+where δ is the anchor's displacement in the base frame, U = ∂²L/∂δ² and u_r those of
+``direction_change``, and d(a) the part of δ by the platform's rotation and by the anchor point.
 
 References
 ----------
@@ -21,15 +27,18 @@ IPAnema paper: docs/papers.md.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.model.rotation import skew
 from winchkit.robot.geometry.constraints import Constraint
+from winchkit.robot.geometry.hessian import direction_change
 from winchkit.robot.geometry.kinematics import Geometry, Pose, lever_of, structure_matrix
-from winchkit.robot.geometry.pose_estimation import moved_pose
-from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload
+from winchkit.robot.geometry.wrench import (
+    gravity_wrench,
+    weight_by_payload,
+    weight_by_rotation,
+)
 from winchkit.schema.profiles.robot import PlatformSpec
 
 _SEEN = 1e-3
@@ -37,9 +46,8 @@ _SEEN = 1e-3
 relative error by a millimetre of geometry in a metre, so that what is left there is no force. A
 platform on four cables that hangs in the middle of its frame has one of zero."""
 
-_STEP = 1e-6
-"""m and rad, of central differences: the truncation (1e-12) and the rounding (2e-16/1e-6) stay
-below 1e-9 of a force. Also the least lever arm of a platform's anchor points, m."""
+_LEAST_LEVER = 1e-6
+"""Least lever arm of a platform's anchor points, m, so that a platform that is a point has one."""
 
 
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
@@ -76,7 +84,7 @@ def hanging_residual(
 
 def wrench_scale(geometry: Geometry) -> Array:
     """Diagonal of S, (6,)."""
-    return np.repeat([1.0, 1.0 / max(lever_of(geometry), _STEP)], 3)
+    return np.repeat([1.0, 1.0 / max(lever_of(geometry), _LEAST_LEVER)], 3)
 
 
 def hanging_balance(
@@ -89,42 +97,37 @@ def hanging_balance(
     """Wrench of measured cable forces (p, n), of the weight and of the inertial forces (p, 6), by
     pose, payload, cable forces and the geometry of all lines; (p, 6), N."""
     scale = wrench_scale(geometry)
+    structure = structure_matrix(geometry, pose.position, pose.rotation)
+    weight = gravity_wrench(platform, pose.rotation) + inertial
+    arm = np.einsum("pij,nj->pni", pose.rotation, geometry.anchor_point)
+    change = direction_change(geometry, pose.position, pose.rotation)
+    size = -tension[..., None, None] * (scale * geometry.free)[:, None]
 
-    def pulls(own: Geometry, at: Pose) -> Array:
-        """Wrench of each cable's force, (p, 6, n)."""
-        structure = structure_matrix(own, at.position, at.rotation)
-        return np.asarray(scale[:, None] * structure * tension[:, None, :])
+    def wrench(turned: Array, moved_arm: Array | float) -> Array:
+        """Derivative of each cable's wrench by k variables, (p, n, 6, k), that change the cable's
+        direction and the anchor's lever arm by these, (p, n, 3, k)."""
+        moment = skew(arm) @ turned - skew(change.direction) @ moved_arm
+        return np.asarray(size * np.concatenate([turned, moment], axis=2))
 
-    def wrench(at: Pose) -> Array:
-        weight = scale * (gravity_wrench(platform, at.rotation) + inertial)
-        return np.asarray(pulls(geometry, at).sum(axis=2) + weight)
-
-    by_pose = np.empty((len(pose.position), 6, 6))
-    for index in range(6):
-        step = np.zeros((len(pose.position), 6))
-        step[:, index] = _STEP * geometry.free[index]
-        ends = [wrench(moved_pose(pose, sign * step)) for sign in (1.0, -1.0)]
-        by_pose[..., index] = (ends[0] - ends[1]) / (2 * _STEP)
+    by_place = wrench(change.by_anchor, np.zeros((3, 3)))
+    turning, with_platform = -skew(arm), np.broadcast_to(pose.rotation[:, None], (*arm.shape, 3))
+    by_turn = wrench(change.by_anchor @ turning, turning)
+    by_pose = np.concatenate([by_place, by_turn], axis=3).sum(axis=1)
+    by_pose[..., 3:] += scale[:, None] * weight_by_rotation(platform, pose.rotation)
+    by_line = {
+        "exit_point": -by_place,
+        "anchor_point": wrench(change.by_anchor @ with_platform, with_platform),
+        "swivel_radius": wrench(change.by_radius[..., None], np.zeros((3, 1))),
+    }
     by = {
         "payload": scale[:, None] * weight_by_payload(platform, pose.rotation),
-        "tension": scale[:, None] * structure_matrix(geometry, pose.position, pose.rotation),
+        "tension": scale[:, None] * structure,
+        **{name: _all_lines(part) for name, part in by_line.items()},
     }
-    # Each cable's wrench depends on its own points alone, so that all lines are moved at once.
-    for name in ("exit_point", "anchor_point", "swivel_radius"):
-        values = getattr(geometry, name)
-        parts = []
-        for move in _moves(values):
-            ends = [
-                pulls(replace(geometry, **{name: values + sign * move}), pose)
-                for sign in (1.0, -1.0)
-            ]
-            parts.append((ends[0] - ends[1]) / (2 * _STEP))
-        by[name] = np.stack(parts, axis=-1).reshape(len(pose.position), 6, values.size)
-    return Constraint(wrench(pose), by_pose, {}, by)
+    residual = scale * wrench_residual(structure, tension, weight)
+    return Constraint(residual, by_pose * geometry.free, {}, by)
 
 
-def _moves(values: Array) -> list[Array]:
-    """Steps of one coordinate of all lines each."""
-    if values.ndim == 1:
-        return [np.full_like(values, _STEP)]
-    return [np.tile(row, (len(values), 1)) for row in _STEP * np.eye(values.shape[1])]
+def _all_lines(part: Array) -> Array:
+    """(p, n, 6, k) as the columns of all lines beside each other, (p, 6, n k)."""
+    return np.moveaxis(part, 1, 2).reshape(len(part), 6, -1)

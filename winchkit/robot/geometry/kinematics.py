@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
+from winchkit.model.rotation import cross, rotation_by, rotation_of, rotation_vector
 from winchkit.robot.geometry.loops import LEAST_WRAP
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -
         Derivatives per line.
     """
     t = _tangent(geometry, position, rotation)
-    across = np.cross(geometry.swivel_axis, np.stack(_unit(t), axis=-1))
+    across = cross(geometry.swivel_axis, np.stack(_unit(t), axis=-1))
     distance = np.where(t.distance > 0, t.distance, np.nan)
     by_anchor = across / distance[..., None]
     return _by_anchor(geometry, by_anchor, t, rotation, np.zeros_like(t.wrap))
@@ -320,7 +320,7 @@ def _by_anchor(
     """Derivatives of a quantity whose gradient by the anchor's place in the base is known."""
     arm = np.stack(t.arm, axis=-1)
     turned = gradient @ rotation
-    by_rotation = np.cross(arm, gradient) * geometry.free[3:]
+    by_rotation = cross(arm, gradient) * geometry.free[3:]
     return Sensitivities(gradient * geometry.free[:3], by_rotation, -gradient, turned, radius)
 
 
@@ -329,4 +329,4 @@ def _swivel_frame(axis: Array) -> tuple[Array, Array]:
     least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
     zero = least - np.sum(least * axis, axis=1, keepdims=True) * axis
     zero /= np.linalg.norm(zero, axis=1, keepdims=True)
-    return zero, np.cross(axis, zero)
+    return zero, cross(axis, zero)

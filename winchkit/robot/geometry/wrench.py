@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.model.rotation import cross, skew
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
@@ -32,7 +33,7 @@ def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
     """
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
-    return np.concatenate([force, np.cross(lever, force)], axis=-1) * platform.free
+    return np.concatenate([force, cross(lever, force)], axis=-1) * platform.free
 
 
 def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
@@ -40,8 +41,16 @@ def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
     out = np.zeros((len(rotation), 6, 4))
     out[..., 0] = gravity_wrench(replace(platform, mass=1.0), rotation)
     for k in range(3):
-        out[:, 3:, 1 + k] = np.cross(rotation[:, :, k], platform.mass * _DOWN) * platform.free[3:]
+        out[:, 3:, 1 + k] = cross(rotation[:, :, k], platform.mass * _DOWN) * platform.free[3:]
     return out
+
+
+def weight_by_rotation(platform: PlatformSpec, rotation: Array) -> Array:
+    """Derivative of :func:`gravity_wrench` by a small rotation vector in the base, (p, 6, 3)."""
+    lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
+    moment = platform.mass * skew(_DOWN) @ skew(lever)
+    free = np.asarray(platform.free)[:, None]
+    return np.asarray(np.concatenate([np.zeros_like(moment), moment], axis=1) * free)
 
 
 def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:

@@ -141,11 +141,16 @@ class ReducedEquations:
     """Information matrix of the scaled parameters, without the prior, (q, q)."""
     gradient: Array
     """Gradient of the cost by the scaled parameters, poses eliminated, with the prior, (q,)."""
+    poses_held: tuple[Array, Array]
+    """Information and gradient without the prior where the poses are held, which no damping
+    changes, (q, q) and (q,)."""
 
     def damped(self, damping: float) -> ReducedEquations:
         """The same equations with the poses damped as the parameters are: a pose with few
         measurements has the longest step of its own."""
-        return self if damping == 0.0 else _reduced(self.cost, self.prior, self.stack, damping)
+        if damping == 0.0:
+            return self
+        return _reduced(self.cost, self.prior, self.stack, self.poses_held, damping)
 
     @property
     def pose_free(self) -> Array:
@@ -245,7 +250,8 @@ def linearise(equations: BundleEquations, state: BundleState, weights: Weights) 
             by_values=stack.by_values * root[..., None],
         )
     cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
-    return _reduced(cost, prior, stack)
+    flat = stack.by_values.reshape(-1, stack.by_values.shape[2])
+    return _reduced(cost, prior, stack, (flat.T @ flat, flat.T @ stack.residual.reshape(-1)))
 
 
 def stacked(equations: Iterable[Rows], weights: Weights, scale: Array) -> Stack:
@@ -268,8 +274,14 @@ def stacked(equations: Iterable[Rows], weights: Weights, scale: Array) -> Stack:
     return Stack(kinds, known, residual, by_pose, by_values)
 
 
-def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> ReducedEquations:
-    many, rows, count = stack.by_values.shape
+def _reduced(
+    cost: float,
+    prior: Array,
+    stack: Stack,
+    poses_held: tuple[Array, Array],
+    damping: float = 0.0,
+) -> ReducedEquations:
+    many, _, count = stack.by_values.shape
     turned = np.swapaxes(stack.by_pose, 1, 2)
     normal = turned @ stack.by_pose
     # Unmeasured directions of a pose do not change.
@@ -279,11 +291,10 @@ def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> R
     factor = np.linalg.inv(np.linalg.cholesky(normal))
     half = factor @ turned
     coupled = (half @ stack.by_values).reshape(6 * many, count)
-    flat = stack.by_values.reshape(many * rows, count)
-    information = flat.T @ flat - coupled.T @ coupled
+    information = poses_held[0] - coupled.T @ coupled
     seen = (half @ stack.residual[..., None]).reshape(6 * many)
-    gradient = flat.T @ stack.residual.reshape(-1) - coupled.T @ seen + prior
-    return ReducedEquations(stack, cost, prior, factor, information, gradient)
+    gradient = poses_held[1] - coupled.T @ seen + prior
+    return ReducedEquations(stack, cost, prior, factor, information, gradient, poses_held)
 
 
 def _pose_steps(linear: ReducedEquations, change: Array) -> Array:
