@@ -68,7 +68,10 @@ def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
     source = "".join(
         (ROOT / "winchkit" / name).read_text(encoding="utf-8")
         for name in (
-            *(f"bench/{own}" for own in ("control/loop.py", "hardware.py", *_RECORDS, "winch.py")),
+            *(
+                f"bench/{own}"
+                for own in ("control/loop.py", "hardware.py", *_RECORDS, "held_winch.py")
+            ),
             *(f"robot/bench/{own}.py" for own in ("correction", "force_loop", "pose_loop")),
         )
     )
