@@ -12,9 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from winchkit.sim.clock.can_bus import SimulatedCanBus, SimulatedCanPort
+from winchkit.sim.clock.lines import SimulatedCanBus, SimulatedCanPort
 from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.drive.faults import FAULTS
+from winchkit.sim.drive.drive import FAULTS
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand

@@ -19,7 +19,7 @@ from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.winch import Winch
 from winchkit.runs import read_run
-from winchkit.runs.recording.rows import RowLog
+from winchkit.runs.recording.open_log import RowLog
 
 _AFTER = 1.1
 """From the last fault until all is mended, s."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from winchkit.errors import UsageError
 from winchkit.model.trajectory import plan
-from winchkit.sim.plant.trajectory import plan as simulated_plan
+from winchkit.sim.schedule import plan as simulated_plan
 
 Plan = Callable[[float, float, float, float], Any]
 limits, jerks = st.floats(1e-2, 20.0), st.floats(0.05, 500.0)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 import pytest
 
 from snippets import ROOT
-from winchkit.bench.control.conditions import BENCH_CONDITIONS
 from winchkit.catalog import find, names
 from winchkit.effects import Catalogue, load_catalogue
 from winchkit.effects.card import card
@@ -69,9 +68,13 @@ def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
     source = "".join(
         (ROOT / "winchkit" / name).read_text(encoding="utf-8")
         for name in (
-            *(f"bench/{own}" for own in ("control/loop.py", "hardware.py", *_RECORDS, "winch.py")),
+            *(
+                f"bench/{own}"
+                for own in ("control/loop.py", "hardware.py", *_RECORDS, "held_winch.py")
+            ),
             *(f"robot/bench/{own}.py" for own in ("correction", "force_loop", "pose_loop")),
         )
     )
     raised = set(re.findall(r'Trip\(\s*"([a-z ]+)"', source))
-    assert raised == {row.kind for row in BENCH_CONDITIONS}
+    rows = runpy.run_path(str(ROOT / "docs/make_safety.py"))["BENCH_CONDITIONS"]
+    assert raised == {row.kind for row in rows}

@@ -35,7 +35,8 @@ from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.state import Judgement
 from winchkit.web.views import views_of
-from winchkit.web.workspace import INTERNAL, DiagnoseView
+from winchkit.web.words import INTERNAL
+from winchkit.web.workspace import DiagnoseView
 
 TOKEN = "t0ken"
 HEADERS = {"x-winchkit-token": TOKEN}
@@ -394,7 +395,7 @@ def test_an_unexpected_error_of_a_task_is_shown_and_not_lost(tmp_path: Path) -> 
 def test_long_runs_are_drawn_before_they_are_compared(
     recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("winchkit.web.workspace._LONG", 1000)
+    monkeypatch.setattr("winchkit.web.work._LONG", 1000)
     seen: list[tuple[bool, list[str], bool]] = []
     workspace = DiagnoseView(tmp_path)
 

@@ -20,8 +20,7 @@ from winchkit.estimation.groups import PulleyGroup, flat_pulleys
 from winchkit.estimation.kernels import PLAIN, Kernels
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.runs.channel_values import real_numbers
-from winchkit.runs.run import Run
+from winchkit.runs.run import Run, real_numbers
 from winchkit.schema.profiles.winch import WinchProfile
 
 _SINGULAR = 1e-10

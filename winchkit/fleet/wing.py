@@ -15,7 +15,7 @@ WING = Wing(
         },
         "Files and simulation": {
             "library": (
-                "winchkit.fleet.cli.group",
+                "winchkit.fleet.cli.library",
                 "Tables of the runs of a folder: index, list, query.",
             )
         },

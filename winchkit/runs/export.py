@@ -7,11 +7,47 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_types
 from winchkit.errors import RunError, UsageError
+from winchkit.extras import library
+from winchkit.regular_file import file_errors
 from winchkit.runs.files import refuse_existing
-from winchkit.runs.log import aligned, log_of_run
+from winchkit.runs.log import Log, aligned, log_of_run
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
+
+
+def write_mf4(log: Log, path: str | Path) -> None:
+    """Write a log as MDF 4, a group per source; raises UsageError without asammdf, FileError."""
+    asammdf = library("asammdf", f"{path}: MF4")
+    start, _ = log.span
+    with asammdf.MDF(version="4.10") as mdf:
+        for source in log.layout.sources:
+            samples = log.samples[source.topic]
+            signals = [
+                asammdf.Signal(
+                    samples=samples.values[:, n],
+                    timestamps=samples.times - start,
+                    unit=signal.unit,
+                    name=signal.column
+                    or f"{source.topic.strip('/').replace('/', '.')}.{signal.name}",
+                )
+                for n, signal in enumerate(source.signals)
+            ]
+            mdf.append(signals, acq_name=source.topic, common_timebase=True)
+        mdf.header.comment = "\n".join(f"{key}: {value}" for key, value in log.metadata.items())
+        with file_errors(path):
+            mdf.save(Path(path), overwrite=True)
+
+
+def write_parquet(run: Run, path: str | Path) -> None:
+    """Write a run as Parquet, null for NaN; raises UsageError without pyarrow, FileError."""
+    library("pyarrow", f"{path}: Parquet")
+    from pyarrow import parquet
+
+    table = run.to_arrow()
+    with file_errors(path), Path(path).open("wb") as stream:
+        parquet.write_table(table, stream, compression="zstd")
+
 
 FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
 
@@ -56,12 +92,8 @@ def export(
     log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
     run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
     if log is not None and suffix == ".mf4":
-        from winchkit.runs.formats.tables import write_mf4
-
         write_mf4(log_of_run(run) if winch else log, output)
     elif suffix == ".parquet":
-        from winchkit.runs.formats.tables import write_parquet
-
         write_parquet(run, output)
     else:
         write_run(run, output, replace=True)

@@ -13,7 +13,6 @@ from winchkit.arguments import path_of
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.files import refuse_existing, write_whole
 from winchkit.runs.formats.csv_read import read_bytes
-from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
 from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, PROFILE, McapFile
 from winchkit.runs.formats.mcap_read import read_content
 from winchkit.runs.formats.mcap_records import (
@@ -29,6 +28,7 @@ from winchkit.runs.formats.mcap_records import (
     records,
     whole_chunk,
 )
+from winchkit.runs.run_writer import CSV_MARK, EVENT_MARK
 
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
 _NO_SAMPLES = (EVENTS, COUNTERS)

@@ -16,11 +16,10 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_type
 from winchkit.errors import UsageError
-from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
 from winchkit.runs.recording.log_file import create
 from winchkit.runs.run import Run
-from winchkit.runs.run_writer import Clock, Columns, RunWriter
+from winchkit.runs.run_writer import Clock, Columns, CsvWriter, RunWriter
 
 
 def open_writer(

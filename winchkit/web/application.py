@@ -27,7 +27,7 @@ from winchkit.version import __version__
 from winchkit.web.channels import TIME, lines_of
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
-from winchkit.web.views import View, attachment
+from winchkit.web.views import View, answered, attachment
 from winchkit.web.workspace import DiagnoseView
 
 if TYPE_CHECKING:
@@ -233,63 +233,42 @@ class _Drawings:
 
     def routes(self) -> list[Route]:
         """The routes."""
+        work = self.workspace
         return [
-            Route("/api/curve", self._curve),
-            Route("/api/multiples", self._multiples),
-            Route("/api/lines", self._lines),
-            Route("/api/card", self._card),
-            Route("/api/pattern", self._pattern),
-            Route("/api/plan", self._plan, methods=["POST"]),
-            Route("/api/effect", self._effect, methods=["POST"]),
-            Route("/api/truth", self._truth),
+            answered("/api/curve", self._curve),
+            answered("/api/multiples", self._multiples),
+            answered("/api/lines", self._lines),
+            answered("/api/card", lambda query: work.card(query.get("effect", ""))),
+            answered("/api/pattern", lambda query: work.pattern(int(query.get("number", "0")))),
+            answered("/api/plan", lambda _: work.plan(), "POST"),
+            answered("/api/effect", lambda _: work.new_effect(), "POST"),
+            answered("/api/truth", lambda _: {"truth": work.truth()}),
             Route("/api/profile", self._profile),
             Route("/api/report", self._report),
         ]
 
-    async def _curve(self, request: Request) -> Response:
-        query = request.query_params
+    def _curve(self, query: QueryParams) -> object:
         if self._has_ended(query):
-            return JSONResponse(None)
+            return None
         curves = self.workspace.curves(query.get("output", ""), beside="beside" in query)
         first, last = float(query.get("from", "-inf")), float(query.get("to", "inf"))
-        points = min(_MOST_POINTS, int(query.get("points", "1600")))
-        return JSONResponse(await asyncio.to_thread(curves.over_time, first, last, points))
+        return curves.over_time(first, last, min(_MOST_POINTS, int(query.get("points", "1600"))))
 
-    async def _multiples(self, request: Request) -> Response:
-        query = request.query_params
+    def _multiples(self, query: QueryParams) -> object:
         if self._has_ended(query):
-            return JSONResponse(None)
-        output, beside, wanted = query.get("output", ""), "beside" in query, query.getlist("over")
-        curves = self.workspace.curves(output, beside=beside)
+            return None
+        output, beside = query.get("output", ""), "beside" in query
         known = self.workspace.side(beside).order_of(output)
-        return JSONResponse(await asyncio.to_thread(curves.multiples, known, wanted))
+        curves = self.workspace.curves(output, beside=beside)
+        return curves.multiples(known, query.getlist("over"))
 
     def _has_ended(self, query: QueryParams) -> bool:
         """Whether a side of a comparison is asked for that was ended meanwhile."""
         return "beside" in query and self.workspace.state.beside is None
 
-    async def _lines(self, request: Request) -> Response:
-        query, used = request.query_params, self.workspace.state.used
-        runs = [(item.name, item.run) for item in used]
-        channel, over = query.get("channel", ""), query.get("over", TIME)
-        return JSONResponse(await asyncio.to_thread(lines_of, runs, channel, over))
-
-    async def _card(self, request: Request) -> Response:
-        effect = request.query_params.get("effect", "")
-        return JSONResponse(await asyncio.to_thread(self.workspace.card, effect))
-
-    async def _pattern(self, request: Request) -> Response:
-        number = int(request.query_params.get("number", "0"))
-        return JSONResponse(await asyncio.to_thread(self.workspace.pattern, number))
-
-    async def _plan(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.workspace.plan))
-
-    async def _effect(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.workspace.new_effect))
-
-    async def _truth(self, request: Request) -> Response:
-        return JSONResponse({"truth": self.workspace.truth()})
+    def _lines(self, query: QueryParams) -> object:
+        runs = [(item.name, item.run) for item in self.workspace.state.used]
+        return lines_of(runs, query.get("channel", ""), query.get("over", TIME))
 
     async def _profile(self, request: Request) -> Response:
         name, text = self.workspace.profile_text()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from starlette.responses import Response
+from starlette.datastructures import QueryParams
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from winchkit import wings
@@ -60,6 +63,15 @@ def views_of(workspace: DiagnoseView, folder: Path) -> list[View]:
     return [
         wings.imported(place)(workspace, folder) for wing in wings.own() for place in wing.views
     ]
+
+
+def answered(path: str, call: Callable[[QueryParams], object], method: str = "GET") -> Route:
+    """A route that answers what ``call`` makes of the query, on a thread, as JSON."""
+
+    async def answer(request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(call, request.query_params))
+
+    return Route(path, answer, methods=[method])
 
 
 def attachment(text: str, name: str, media: str) -> Response:

@@ -24,9 +24,9 @@ from winchkit.drivers.instrument_process.process import (
     InstrumentProcess,
     LineInstrument,
     ProcessLineSpec,
+    SeparateInstrument,
     line_of,
 )
-from winchkit.drivers.instrument_process.separate import SeparateInstrument
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec

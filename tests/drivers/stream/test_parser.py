@@ -12,10 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stream_rig import DEVICES, device, stream
-from winchkit.drivers.stream.decoder import FrameType
-from winchkit.drivers.stream.framing import BinaryFraming, TextFraming
-from winchkit.drivers.stream.matcher import Matcher, fits
-from winchkit.drivers.stream.parser import StreamFrame, StreamParser
+from winchkit.drivers.stream.decoder import FrameType, Matcher, fits
+from winchkit.drivers.stream.parser import BinaryFraming, StreamFrame, StreamParser, TextFraming
 from winchkit.schema.template import parts_of
 from winchkit.sim.instruments.stream_frames import IndicatorState, Speech
 

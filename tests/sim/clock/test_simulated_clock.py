@@ -15,7 +15,7 @@ from winchkit.catalog import find
 from winchkit.errors import WinchkitError
 from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
-from winchkit.sim.clock.can_bus import SimulatedCanBus
+from winchkit.sim.clock.lines import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.buses import BusWire, Carried

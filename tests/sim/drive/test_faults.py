@@ -7,7 +7,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from drive_rig import COUNT, NODE, Flywheel, Rig
 from winchkit.errors import UsageError
-from winchkit.sim.drive.faults import CONDITIONS, FAULTS
+from winchkit.sim.drive.drive import CONDITIONS, FAULTS
 
 CSV = 9
 SPEED, RATE = 400_000, 2_000_000

@@ -17,7 +17,7 @@ from winchkit.sim.plant.kinematics import Kinematics
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.sensors import GaussianNoise, Measurement
 from winchkit.sim.plant.servo import DriveCommand, Servo
-from winchkit.sim.plant.trajectory import plan
+from winchkit.sim.schedule import plan
 
 
 def lift(

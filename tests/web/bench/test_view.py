@@ -29,8 +29,12 @@ from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.web.application import _refused
 from winchkit.web.bench.browser import Browser, Inbox
-from winchkit.web.bench.drive_objects import drive_objects, drive_settings, write_setting
-from winchkit.web.bench.frames import FrameWords
+from winchkit.web.bench.drive_objects import (
+    FrameWords,
+    drive_objects,
+    drive_settings,
+    write_setting,
+)
 from winchkit.web.bench.live_model import CHANNELS, LiveModel
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes

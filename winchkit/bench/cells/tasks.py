@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from winchkit.bench.cells.desk import CellDesk, full_name, indicated
 from winchkit.bench.cells.report import about, counters_told, rate_report
@@ -21,24 +21,13 @@ from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
 
-class BenchCells(Protocol):
+@dataclass(frozen=True)
+class BenchCells:
     """The instruments of a bench, here or at its owner."""
 
     spec: BenchSpec
-
-    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """One of TASKS for an instrument by its full name; raises what that raises."""
-
-
-class LocalCells:
-    """Instruments that this process has opened."""
-
-    def __init__(self, desk: CellDesk) -> None:
-        self.spec, self._desk = desk.spec, desk
-
-    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """One of TASKS for an instrument."""
-        return do(self._desk, task, name, *arguments)
+    do: Callable[..., dict[str, Any]]
+    """Carries out one of TASKS for an instrument by its full name; raises what that raises."""
 
 
 def do(desk: CellDesk, task: str, name: str, *arguments: Any) -> dict[str, Any]:

@@ -131,14 +131,3 @@ class RemoteStation(Station):
             pass  # it stops everything when it ends
         finally:
             self._requests.close()
-
-
-class RemoteCells:
-    """The instruments of a bench that another process owns."""
-
-    def __init__(self, spec: BenchSpec, station: RemoteStation) -> None:
-        self.spec, self._station = spec, station
-
-    def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """One of :data:`~winchkit.bench.cells.tasks.TASKS`, done by the owner."""
-        return self._station.cell(task, name, *arguments)

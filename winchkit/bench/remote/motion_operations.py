@@ -1,7 +1,5 @@
 """The operations of a bench that move its winches, or stop them."""
 
-# mypy: disable-error-code="empty-body"
-
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
@@ -311,6 +309,13 @@ class MotionStation(BaseStation):
         speed : float or None
             Speed of the search, m/s.
         """
+        from winchkit.bench.control.homing_motion import HomingRequest
+
+        asked = HomingRequest(method, at, speed)
+        with self._acting():
+            self._homing = self._bench.homing(self._bench.named(winch).name, asked)
+            next(self._homing, None)
+        self._led = DeadMan(self.clock.now() + LIFE_SIGN)
 
     @operation()
     def homing(self) -> bool:

@@ -1,8 +1,7 @@
 """The operations of a bench: one table, from which client and server are derived.
 
 An operation has its signature, its description and what the owner's process does here, those that
-move the winches in ``motion_operations``. Where that needs modules which no client loads, it is in
-``station``.
+move the winches in ``motion_operations``. What only that needs is imported when it is done.
 """
 
 # mypy: disable-error-code="empty-body"
@@ -102,6 +101,11 @@ class Station(MotionStation):
     @operation()
     def counters(self) -> dict[str, dict[str, Any]]:
         """Counts by instrument (``A.cell``), and for the log of this station."""
+        from winchkit.bench.recording.recorder import counters_of
+
+        if self._recorder is not None:
+            return self._recorder.counters()
+        return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
 
     @operation()
     def trip_history(self) -> dict[str, Any] | None:
@@ -152,6 +156,13 @@ class Station(MotionStation):
         replace : bool
             Write over earlier runs of a programme of this name.
         """
+        from winchkit.bench.remote.programme_run import ProgrammeRun
+
+        if self._programme is not None and not self._programme.ended:
+            raise UsageError("a programme of this client is under way; end it first")
+        self._programme = ProgrammeRun(
+            self._bench, self.client, path, folder, suffix, replace=replace
+        )
 
     @operation()
     def programme(self) -> dict[str, Any] | None:
@@ -223,6 +234,9 @@ class Station(MotionStation):
         dict
             Result of the task, as JSON has it.
         """
+        from winchkit.bench.cells.tasks import do
+
+        return do(self._bench.cells, task, name, *arguments)
 
 
 def _tare(cell: Sensor) -> float | None:

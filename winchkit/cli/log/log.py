@@ -28,8 +28,8 @@ from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.errors import UsageError, WinchkitError
 
 if TYPE_CHECKING:
-    from winchkit.bench.cells.cell_log import CellStation
     from winchkit.bench.recording.live_sinks import LiveSink
+    from winchkit.bench.remote.cell_session import CellStation
     from winchkit.bench.remote.operations import Station
 
 COMMANDS = {
@@ -144,7 +144,7 @@ def _follow(bench: str, log: _Log, effects: Sequence[str]) -> None:
             f"bench '{spec.name}' has instruments only, of which there are no live pictures; leave "
             "out --jsonl and --udp, and name a file by -o"
         )
-    from winchkit.bench.cells.cell_log import at_cell_station
+    from winchkit.bench.remote.cell_session import at_cell_station
 
     with at_cell_station(spec) as station:
         log.follow(station)

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from winchkit.fleet.library.faults import run_faults
 from winchkit.fleet.library.index import indexed, no_progress
 from winchkit.fleet.library.partitions import Partitions, Row
-from winchkit.fleet.library.sessions import winch_sessions
+from winchkit.fleet.library.sessions import run_faults, winch_sessions
 from winchkit.fleet.library.tasks import Outcome, Task, outcome_of, task_of
 
 _COMMIT = 5.0

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit.errors import FileError, RunError, UsageError, suggest
-from winchkit.fleet.library.faults import run_faults
 from winchkit.fleet.library.index import indexed, no_progress, profile_of_runs, profile_path
 from winchkit.fleet.library.partitions import Partitions
-from winchkit.fleet.library.sessions import WinchSession, winch_sessions
+from winchkit.fleet.library.sessions import WinchSession, run_faults, winch_sessions
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from starlette.requests import Request
-from starlette.responses import JSONResponse, Response
+from starlette.datastructures import QueryParams
 from starlette.routing import Route
 
 from winchkit.fleet.web.fleet import Fleet
 from winchkit.fleet.web.runs import Library
 from winchkit.web.channels import TIME
-from winchkit.web.views import Order, View
+from winchkit.web.views import Order, View, answered
 from winchkit.web.workspace import DiagnoseView
 
 
@@ -31,10 +29,13 @@ class LibraryView(View):
     def routes(self) -> list[Route]:
         """Tables of runs and of the fleet."""
         return [
-            Route("/api/runs", self._runs),
-            Route("/api/overlay", self._overlay),
-            Route("/api/fleet", self._fleet),
-            Route("/api/fleet/runs", self._fleet_runs),
+            answered("/api/runs", lambda _: self.library.rows(dict(self.workspace.judged))),
+            answered("/api/overlay", self._overlay),
+            answered("/api/fleet", lambda _: self.fleet.view()),
+            answered(
+                "/api/fleet/runs",
+                lambda query: self.fleet.runs(query["winch"], float(query["time"])),
+            ),
         ]
 
     def orders(self) -> Mapping[str, Order]:
@@ -51,20 +52,6 @@ class LibraryView(View):
         effects = [str(effect) for effect in asked.get("effects", ())]
         self.fleet.fit(str(asked["profile"]), effects, self.workspace.progress)
 
-    async def _runs(self, request: Request) -> Response:
-        judged = dict(self.workspace.judged)
-        return JSONResponse(await asyncio.to_thread(self.library.rows, judged))
-
-    async def _overlay(self, request: Request) -> Response:
-        query = request.query_params
+    def _overlay(self, query: QueryParams) -> object:
         wanted, channel = query.getlist("name"), query.get("channel", "tension")
-        over = query.get("over", TIME)
-        return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel, over))
-
-    async def _fleet(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.fleet.view))
-
-    async def _fleet_runs(self, request: Request) -> Response:
-        query = request.query_params
-        winch, time = query["winch"], float(query["time"])
-        return JSONResponse(await asyncio.to_thread(self.fleet.runs, winch, time))
+        return self.library.overlay(wanted, channel, query.get("over", TIME))

@@ -11,8 +11,8 @@ from winchkit.arguments import positive, require_type
 from winchkit.arrays import Array
 from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
 from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.held_winch import LONGEST_HOLD
 from winchkit.bench.host import WinchHost
-from winchkit.bench.winch import LONGEST_HOLD
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.plain_json import finite_or_none
 from winchkit.robot.bench.correction import CableCorrection, Correction, HeldCorrection

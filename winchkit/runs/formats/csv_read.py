@@ -22,10 +22,10 @@ from winchkit.errors import Fault, RunError
 from winchkit.regular_file import read_whole, regular
 from winchkit.runs.assemble import RawColumns, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
-from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
 from winchkit.runs.log import Note, known_event
 from winchkit.runs.recording.log_file import is_written
 from winchkit.runs.run import Run
+from winchkit.runs.run_writer import CSV_MARK, EVENT_MARK
 
 _PIECE = 1 << 20
 """Bytes read at a time, so that a large file needs no memory of its size."""

@@ -20,7 +20,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, ProgrammeStep
 from winchkit.schema.simbench import FaultSpec, SimBench, WinchTruth
 from winchkit.sim.bench import hiding, profiles_of
-from winchkit.sim.clock.can_bus import SimulatedCanBus
+from winchkit.sim.clock.lines import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.live.buses import TICK, BusWire, CanPort, Interface, serve, wired

@@ -12,7 +12,7 @@ from winchkit.catalog import find
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.bench import BusSpec, DeviceRef, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
-from winchkit.sim.clock.serial_line import SimulatedSerialLine
+from winchkit.sim.clock.lines import SimulatedSerialLine
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.instruments.instrument import in_unit
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of

@@ -14,8 +14,7 @@ from winchkit.schema.bench import DeviceRef, WinchWiring
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
-from winchkit.sim.drive.drive import SimDrive
-from winchkit.sim.drive.faults import known
+from winchkit.sim.drive.drive import SimDrive, known
 from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.instruments.process import SimulatedProcessInstrument
 from winchkit.sim.live.instruments import device_of, instruments_of

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, Protocol, Self
 from urllib.parse import unquote
 
+from starlette.datastructures import QueryParams
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
@@ -35,17 +36,17 @@ from winchkit.schema.read import read_bench
 from winchkit.web.bench import messages
 from winchkit.web.bench.browser import BEGINS_NOTHING, Browser, counting, received
 from winchkit.web.bench.drive_objects import (
+    FrameWords,
     drive_objects,
     drive_settings,
     read_setting,
     write_setting,
 )
-from winchkit.web.bench.frames import FrameWords
 from winchkit.web.bench.live_model import CHANNELS, LiveModel
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
-from winchkit.web.views import attachment
+from winchkit.web.views import answered, attachment
 from winchkit.web.words import INTERNAL, free_path
 
 _LOGGER = logging.getLogger(__name__)
@@ -163,15 +164,17 @@ class BenchView:
         """Routes of the Bench view."""
         return [
             Route("/api/bench", self._declared),
-            Route("/api/bench/history", self._past),
-            Route("/api/bench/trip", self._trip),
+            answered("/api/bench/history", lambda _: self._past()),
+            answered("/api/bench/trip", lambda _: self._watched().trip_history()),
             Route("/api/bench/trip.csv", self._trip_file),
-            Route("/api/bench/frames", self._frames),
-            Route("/api/bench/programmes", self._listed),
-            Route("/api/bench/programme", self._preview),
+            answered("/api/bench/frames", lambda _: self._words.table(self._watched().frames())),
+            answered(
+                "/api/bench/programmes", lambda _: {"programmes": list(self._programmes.paths())}
+            ),
+            answered("/api/bench/programme", self._preview),
             Route("/api/bench/programme", self._upload, methods=["POST"]),
-            Route("/api/bench/objects", self._objects),
-            Route("/api/bench/setting", self._setting),
+            answered("/api/bench/objects", self._objects),
+            answered("/api/bench/setting", self._setting),
             Route("/api/bench/setting", self._write, methods=["POST"]),
             Route("/api/bench/stop", self._stop, methods=["POST"]),
             WebSocketRoute("/live/bench", self._live),
@@ -191,11 +194,8 @@ class BenchView:
             }
         )
 
-    async def _past(self, request: Request) -> Response:
-        return JSONResponse({name: list(rows) for name, rows in self._history.items()})
-
-    async def _trip(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self._watched().trip_history))
+    def _past(self) -> dict[str, list[dict[str, Any]]]:
+        return {name: list(rows) for name, rows in self._history.items()}
 
     async def _trip_file(self, request: Request) -> Response:
         found = await asyncio.to_thread(self._watched().trip_history)
@@ -211,23 +211,13 @@ class BenchView:
             raise ConnectionLost(self._lost or "the bench is not attached yet; ask again")
         return station
 
-    async def _frames(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self._frame_table))
-
-    def _frame_table(self) -> dict[str, Any]:
-        return self._words.table(self._watched().frames())
-
-    async def _listed(self, request: Request) -> Response:
-        return JSONResponse({"programmes": list(await asyncio.to_thread(self._programmes.paths))})
-
-    async def _preview(self, request: Request) -> Response:
-        name = request.query_params.get("name", "")
+    def _preview(self, query: QueryParams) -> dict[str, Any]:
         here = {
             winch: float(state["cable_length"])
             for winch, state in self._newest.get("winch", {}).items()
             if state["cable_length"] is not None
         }
-        return JSONResponse(await asyncio.to_thread(self._programmes.preview, name, here))
+        return self._programmes.preview(query.get("name", ""), here)
 
     async def _upload(self, request: Request) -> Response:
         body = b""
@@ -238,17 +228,14 @@ class BenchView:
         name = unquote(request.headers.get("x-file-name", ""))
         return JSONResponse({"name": await asyncio.to_thread(self._programmes.keep, name, body)})
 
-    async def _objects(self, request: Request) -> Response:
-        winch = request.query_params.get("winch", "")
-        found = await asyncio.to_thread(drive_objects, self.spec, self._newest, winch)
-        known = drive_settings(self.spec, winch) if self.allow_motion else []
-        return JSONResponse(found | {"settings": known})
+    def _objects(self, query: QueryParams) -> dict[str, Any]:
+        winch = query.get("winch", "")
+        found = drive_objects(self.spec, self._newest, winch)
+        return found | {"settings": drive_settings(self.spec, winch) if self.allow_motion else []}
 
-    async def _setting(self, request: Request) -> Response:
-        query = request.query_params
+    def _setting(self, query: QueryParams) -> dict[str, Any]:
         winch, setting = query.get("winch", ""), query.get("object", "")
-        value = await asyncio.to_thread(read_setting, self.spec, self._newest, winch, setting)
-        return JSONResponse({"value": value})
+        return {"value": read_setting(self.spec, self._newest, winch, setting)}
 
     async def _write(self, request: Request) -> Response:
         asked = messages.decoded((await request.body()).decode(errors="replace"))

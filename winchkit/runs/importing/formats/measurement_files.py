@@ -1,4 +1,4 @@
-"""Readers of ASAM MDF files (extra ``mf4``) and of NI TDMS files (extra ``tdms``)."""
+"""Readers of binary tables by the library of each: MDF, TDMS, NPY, NPZ, Parquet and XLSX."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import html
 import io
 import re
 import sys
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from datetime import date, datetime, time, timedelta
 from typing import Any
 
 import numpy as np
@@ -16,7 +19,10 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, WinchkitError
 from winchkit.extras import library
-from winchkit.runs.importing.formats.variables import column_of
+from winchkit.runs.importing.formats.dialect import Dialect, has_cell_units
+from winchkit.runs.importing.formats.header import Row
+from winchkit.runs.importing.formats.text import table_of_rows
+from winchkit.runs.importing.formats.variables import column_of, table_of_arrays
 from winchkit.runs.importing.table import (
     ColumnTable,
     FileColumn,
@@ -24,6 +30,136 @@ from winchkit.runs.importing.table import (
     readable,
     refuse_size,
 )
+
+_OBJECTS = (
+    "has Python objects, which may hold code; load it in Python where you trust it, and write its "
+    "arrays by numpy.savez"
+)
+
+
+def read_numpy(path: str, data: bytes) -> ColumnTable:
+    """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code."""
+    try:
+        if data.startswith(b"PK"):
+            with zipfile.ZipFile(io.BytesIO(data)) as packed:
+                refuse_size(path, sum(item.file_size for item in packed.infolist()), "arrays")
+        loaded = np.load(io.BytesIO(data), allow_pickle=False)
+        arrays = dict(loaded) if hasattr(loaded, "files") else None
+    except RunError:
+        raise
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError, MemoryError) as error:
+        reason = _OBJECTS if "pickle" in str(error) else error
+        raise RunError(Fault(f"is not a readable NumPy file: {reason}", path)) from None
+    if arrays is None:
+        names = loaded.dtype.names
+        arrays = {name: loaded[name] for name in names} if names else {"array": loaded}
+    return table_of_arrays(path, "NPZ" if data.startswith(b"PK") else "NPY", arrays)
+
+
+def read_parquet(path: str, data: bytes) -> ColumnTable:
+    """Read Parquet; raises UsageError without pyarrow, RunError for an invalid file."""
+    pa = library("pyarrow", f"{path}: Parquet")
+    from pyarrow import parquet
+
+    with readable(path, "Parquet file"):
+        source = parquet.ParquetFile(io.BytesIO(data))
+        shape = source.metadata.num_rows * source.metadata.num_columns
+        refuse_size(path, 8 * shape, "columns")
+        table = source.read()
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for field, column in zip(table.schema, table.columns, strict=True):
+        own = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
+        is_number = pa.types.is_integer(field.type) or pa.types.is_floating(field.type)
+        is_truth = pa.types.is_boolean(field.type)
+        is_text = pa.types.is_temporal(field.type) or pa.types.is_string(field.type)
+        if is_number or is_truth or is_text:
+            arrays[field.name] = (column.cast(pa.int8()) if is_truth else column).to_numpy()
+            units[field.name] = own
+    plain_metadata = {
+        key.decode("utf-8", "replace"): value.decode("utf-8", "replace")
+        for key, value in (table.schema.metadata or {}).items()
+        if key not in (b"pandas", b"ARROW:schema")
+    }
+    return table_of_arrays(path, "Parquet", arrays, units=units, metadata=plain_metadata)
+
+
+def read_workbook(path: str, data: bytes) -> ColumnTable:
+    """Read a workbook; raises UsageError without openpyxl, RunError without rows of numbers."""
+    openpyxl = library("openpyxl", f"{path}: XLSX")
+    with readable(path, "workbook"):
+        with zipfile.ZipFile(io.BytesIO(data)) as packed:
+            refuse_size(path, sum(item.file_size for item in packed.infolist()), "a workbook")
+        book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True)
+        sheets = {
+            sheet.title: _rows(sheet.iter_rows(values_only=True)) for sheet in book.worksheets
+        }
+    tables = {}
+    for title, rows in sheets.items():
+        width = max((len(cells) for _, cells in rows), default=0)
+        if not width:
+            continue
+        try:
+            spelled = has_cell_units([cells for _, cells in rows], ".")
+            dialect = Dialect("\t", ".", _width(rows), spelled)
+            tables[title] = table_of_rows(path, _cut(rows, dialect.width), dialect, is_ended=True)
+        except RunError:
+            continue
+    if not tables:
+        raise RunError(Fault("has no sheet with rows of numbers", path))
+    first = next(iter(tables.values()))
+    columns = named_apart(
+        [
+            replace(item, group=title if len(tables) > 1 else "")
+            for title, table in tables.items()
+            for item in table.columns
+        ]
+    )
+    return ColumnTable(
+        path,
+        f"XLSX, sheet {', '.join(tables)}",
+        columns,
+        first.line_of,
+        {key: value for table in tables.values() for key, value in table.metadata.items()},
+        faults=tuple(fault for table in tables.values() for fault in table.faults),
+        notes=tuple(note for table in tables.values() for note in table.notes),
+        interval=first.interval,
+    )
+
+
+def _rows(rows: Iterable[Iterable[object]]) -> list[Row]:
+    """Cells as text; without the rows below the last filled one, which have formats only."""
+    found = [(n, [_text(cell) for cell in row]) for n, row in enumerate(rows, start=1)]
+    while found and not any(found[-1][1]):
+        found.pop()
+    return found
+
+
+def _text(cell: object) -> str:
+    if cell is None:
+        return ""
+    if isinstance(cell, bool):
+        return "1" if cell else "0"
+    if isinstance(cell, datetime | date | time):
+        return cell.isoformat()
+    if isinstance(cell, timedelta):
+        return repr(cell.total_seconds())
+    return repr(cell) if isinstance(cell, float) else str(cell).strip()
+
+
+def _width(rows: list[Row]) -> int:
+    """Number of cells up to the last column that is filled in most of the lower rows."""
+    lower = [cells for _, cells in rows[len(rows) // 2 :]]
+    width = max((len(cells) for cells in lower), default=0)
+    while width and not any(len(c) >= width and c[width - 1] for c in lower):
+        width -= 1
+    return width
+
+
+def _cut(rows: list[Row], width: int) -> list[Row]:
+    """Rows of one width; cells to the right of the table belong to notes and charts."""
+    return [(n, [*cells, *[""] * (width - len(cells))][:width]) for n, cells in rows]
+
 
 _NUMBERS = "fiub"
 """Kinds of arrays (NumPy) that hold numbers or truth values."""

@@ -37,7 +37,7 @@ def _read(path: str | Path) -> ColumnTable:
     if data.startswith((b"MATLAB", _HDF5)) or _HDF5 in data[:1024] or _is_mat4(path, data):
         return _of_arrays(name, data)
     if data.startswith((b"PAR1", b"\x93NUMPY")):
-        from winchkit.runs.importing.formats.column_files import read_numpy, read_parquet
+        from winchkit.runs.importing.formats.measurement_files import read_numpy, read_parquet
 
         return (read_parquet if data.startswith(b"PAR1") else read_numpy)(name, data)
     if data.startswith(b"\x89MCAP0\r\n"):
@@ -91,11 +91,11 @@ def _packed(name: str, data: bytes) -> ColumnTable:
     except zipfile.BadZipFile as error:
         raise RunError(Fault(f"is a damaged ZIP archive: {error}", name)) from None
     if any(item.startswith("xl/") for item in names):
-        from winchkit.runs.importing.formats.spreadsheet import read_workbook
+        from winchkit.runs.importing.formats.measurement_files import read_workbook
 
         return read_workbook(name, data)
     if names and all(item.endswith(".npy") for item in names):
-        from winchkit.runs.importing.formats.column_files import read_numpy
+        from winchkit.runs.importing.formats.measurement_files import read_numpy
 
         return read_numpy(name, data)
     message = f"is an archive of {', '.join(names[:3])} …; unpack it and import the files in it"
