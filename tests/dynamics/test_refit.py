@@ -109,7 +109,8 @@ def test_the_stated_deviations_are_those_of_the_values_over_repeats(
         values = [one.terms[place].values[name] for one in found]
         stated = np.mean([one.std[place][name] for one in found])
         assert np.mean(values) == pytest.approx(TRUE[name], abs=4 * np.std(values) / 10**0.5)
-        assert 0.3 < stated / np.std(values, ddof=1) < 3.0
+        # Of the torque's noise they are an upper bound (inertia of a sinusoid: four times).
+        assert 0.3 < stated / np.std(values, ddof=1) < (6.0 if noises[1] else 3.0)
 
 
 def test_effects_of_instruments_stay_as_they_are(tmp_path: Path) -> None:
