@@ -262,6 +262,28 @@ def test_conditions_of_a_user_effect_compile(tmp_path: Path) -> None:
     assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-12
 
 
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+@pytest.mark.parametrize("name", ["load", "before", "is-started", "motor/rate"])
+def test_names_of_the_step_are_free_for_user_effects(tmp_path: Path, name: str) -> None:
+    """A memory, or a parameter, that has the name of an input."""
+    profile, states = machine(tmp_path), random_states(300, 7)
+    own, _, parameter = name.partition("/")
+    if parameter:
+        gain = EFFECTS["cell-gain"]
+        renamed = (replace(gain.parameters[0], name=parameter),)
+        mine = replace(
+            gain, id=own, parameters=renamed, apply=lambda v, at, p: v * (1 + p[parameter])
+        )
+        terms = [Term(mine, {parameter: 0.1})]
+    else:
+        states[:, 1] = np.cumsum(np.random.default_rng(8).uniform(-0.02, 0.02, len(states)))
+        terms = [used(replace(EFFECTS["motor-dahl"], id=own))]
+    expected = predicted(profile, terms, states)
+    outputs, _ = by_c(tmp_path, profile, terms, states)
+    assert np.max(differences(outputs, expected)) < 1e-12
+    assert np.max(differences(by_python(profile, terms, states), expected)) < 1e-12
+
+
 def by_python(
     profile: WinchProfile, terms: list[Term], states: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -307,7 +329,9 @@ def test_the_json_has_every_formula(tmp_path: Path) -> None:
     assert {one["value"] for one in found["outputs"].values()} <= known
 
 
-@pytest.mark.parametrize("name", ["none", "a */ b", 'my "joint" <1>', "größe", "2", "a--b\\"])
+@pytest.mark.parametrize(
+    "name", ["none", "a */ b", "a /* b", 'my "joint" <1>', "größe", "2", "a--b\\"]
+)
 def test_names_of_a_profile_break_no_text(tmp_path: Path, name: str) -> None:
     quoted = json.dumps(name, ensure_ascii=False)
     profile = profile_of(tmp_path, AXIS.replace('name = "axis"', f"name = {quoted}"))
@@ -321,6 +345,9 @@ def test_names_of_a_profile_break_no_text(tmp_path: Path, name: str) -> None:
 
 
 def test_an_infinite_constant_is_written(tmp_path: Path) -> None:
+    """JSON has no infinity: other readers than Python's refuse it as a number."""
     stiff = used(EFFECTS["cable-elongation-linear"])
     rigid = replace(stiff, values=dict.fromkeys(stiff.values, np.inf))
     exec(python_module(machine(tmp_path), [rigid]), {})
+    found = json.dumps(as_json(machine(tmp_path), [rigid]), allow_nan=False)
+    assert '"value": "Infinity"' in found

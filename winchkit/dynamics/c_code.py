@@ -140,8 +140,8 @@ def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
 
 
 def in_comment(name: str) -> str:
-    """A name of a profile, which may end no comment of C."""
-    return name.replace("*/", "* /")
+    """A name of a profile, which may begin and end no comment of C."""
+    return name.replace("*/", "* /").replace("/*", "/ *")
 
 
 def identifier(name: str) -> str:
@@ -180,19 +180,29 @@ def c_body(
     return body + "".join(f"    {target} = r{i};\n" for i, target in enumerate(targets))
 
 
+def json_number(value: float) -> float | str:
+    """A number, or its name in JavaScript, Python and Protocol Buffers where JSON has none."""
+    if isnan(value):
+        return "NaN"
+    return f"{'-' * (value < 0)}Infinity" if isinf(value) else value
+
+
 def assigned(
     roots: Sequence[Expression], names: Mapping[str, str]
 ) -> tuple[list[list[object]], list[str]]:
     """Assignments ``[name, operation, arguments]`` that compute expressions, and the name or number
-    of each; ``names`` are of their symbols."""
+    of each; ``names`` are of their symbols. Arguments are names, or numbers as by
+    :func:`json_number`."""
     values: dict[int, str] = {}
     assignments: list[list[object]] = []
     for x in ordered(roots):
         if not x.arguments:
-            values[id(x)] = names.get(x.name, x.name) or repr(x.value)
+            values[id(x)] = names.get(x.name, x.name) or str(json_number(x.value))
             continue
         values[id(x)] = f"t{len(assignments)}"
-        arguments = [values[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
+        arguments = [
+            values[id(a)] if a.name or a.arguments else json_number(a.value) for a in x.arguments
+        ]
         assignments.append([values[id(x)], x.operation, *arguments])
     return assignments, [values[id(x)] for x in roots]
 
@@ -210,11 +220,11 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
         "profile": profile.name,
         "inputs": {n: {"unit": u, "what": w} for n, u, w in inputs.values()},
         "before": f"the same of the sample before, with the prefix {BEFORE}",
-        "constants": {c.name: {"value": c.value, "unit": c.unit, "source": c.source}
+        "constants": {c.name: {"value": json_number(c.value), "unit": c.unit, "source": c.source}
                       for c in step.constants},
         "assignments": assignments,
         "outputs": {n: {"value": x, "unit": OUTPUTS[n][0]}
                     for n, x in zip(step.outputs, values, strict=False)},
-        "memory": {m.name: {"start": m.start, "next": x}
+        "memory": {m.name: {"start": json_number(m.start), "next": x}
                    for m, x in zip(step.memories, after, strict=True)},
     }  # fmt: skip

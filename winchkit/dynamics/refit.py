@@ -10,8 +10,7 @@ References
 ----------
 Bock, H. G., Plitt, K. J. (1984). A multiple shooting algorithm for direct solution of optimal
 control problems. IFAC Proceedings 17, 1603-1608.
-Liang, K.-Y., Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models.
-Biometrika 73, 13-22.
+Efron, B., Tibshirani, R. J. (1993). An introduction to the bootstrap, ch. 6.
 """
 
 from __future__ import annotations
@@ -31,9 +30,11 @@ from winchkit.dynamics.balance import ON_MOTION, Balance, balance
 from winchkit.dynamics.comparison import SimulatedError, open_loop_error, smoothed
 from winchkit.dynamics.drives import Inputs
 from winchkit.dynamics.forward import Setup, driving_part, law_of, motion_of, setup_of
+from winchkit.dynamics.torque_noise import noisy, spectrum, torque_left
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
+from winchkit.model.derivatives import SamplingTimes
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.schema.profiles.winch import WinchProfile
@@ -51,6 +52,11 @@ _TOLERANCE = 1e-6
 """Relative error of a step of the integration, far below that of the model."""
 _EXACT = 1e-12
 """SI: noise of a state that is given without any, so that it has a weight."""
+_DRAWS = 50
+"""Simulated motions of which a deviation is computed, to a tenth; computing cost: below that of a
+third of the fit."""
+_UNLIKELY = 0.05
+"""Share of the draws whose errors are below those of the fit, at least; convention."""
 _SETTLED = 0.1
 """Change of the sum of squares in units of its mean that ends the fit: a value that is off by its
 standard deviation changes it by one."""
@@ -107,8 +113,9 @@ def refit_to_motion(
     """Refit effects, from the values of ``terms``, so that the measured torque makes the measured
     motion; ``progress`` is called with the number of the step.
 
-    Least squares of the position over all pieces. The standard deviations allow for errors that are
-    correlated within a piece (cluster-robust covariance). Raises RunError for a run without angle
+    Least squares of the position over all pieces. The standard deviations are those of values that
+    are refitted to motions under another noise of the torque, with the spectrum of what the values
+    leave of the measured torque. Raises RunError for a run without angle
     or torque, or with missing values; UsageError for effects without a step, where none acts on the
     motion, and as :func:`forward`.
     """
@@ -154,6 +161,7 @@ class _WholeRun:
     """Motor speed, (n,), rad/s."""
     noise: tuple[float, float]
     """Of the angle and the speed."""
+    clock: SamplingTimes
 
     @classmethod
     def of(cls, run: Run, profile: WinchProfile) -> _WholeRun:
@@ -162,7 +170,25 @@ class _WholeRun:
         clock = smoothed(own, profile)
         setup = setup_of(profile, run, None, float(clock.rate[0]), is_torque=True)
         noise = local_noise(own["motor_angle"]), clock.rate_noise
-        return cls(own, setup, clock.rate, (max(noise[0], _EXACT), max(noise[1], _EXACT)))
+        return cls(own, setup, clock.rate, (max(noise[0], _EXACT), max(noise[1], _EXACT)), clock)
+
+    def torque_noise(
+        self,
+        profile: WinchProfile,
+        terms: Sequence[Term],
+        fitted: int,
+        random: np.random.Generator,
+    ) -> Array:
+        """Deviations of the cosine transform of its torque's noise, (n,): of what the effects leave
+        along the measured motion, less what the noise of the angle adds to that."""
+        channel = self.run.channels["motor_angle"]
+        angle = channel.values
+        other = angle + self.noise[0] * random.standard_normal(len(angle))
+        channels = {**self.run.channels, "motor_angle": replace(channel, values=other)}
+        clock = smoothed(replace(self.run, channels=channels), profile)
+        left = torque_left(profile, terms, self.setup, angle, self.clock)
+        seen = torque_left(profile, terms, self.setup, other, clock) - left
+        return spectrum(left, seen, fitted)
 
     def pieces(self, profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
         """Stretches that are fitted: one where effects have states that no instrument reads."""
@@ -297,10 +323,10 @@ class _Shooting:
             x_scale="jac", max_nfev=_MOST,
             ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
         )  # fmt: skip
-        covariance = self._covariance(np.asarray(found.jac), found.fun)
-        deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        terms, states = self.at(found.x)
+        deviations = self._deviations(np.asarray(found.jac), found.fun, terms, states)
         fitted_speeds = deviations[count + 1 :: 2]
-        terms, std, place = self.terms_at(found.x[:count]), list[dict[str, float]](), 0
+        std, place = list[dict[str, float]](), 0
         for index, term in enumerate(self.terms):
             own = Coordinates(term.effect)
             if index not in self.fitted:
@@ -311,7 +337,7 @@ class _Shooting:
             place += len(own)
         return MotionFit(
             terms, tuple(std), self.errors(self.terms, self.states_of_data),
-            self.errors(terms, self.states_at(found.x), fitted_speeds), found.status > 0,
+            self.errors(terms, states, fitted_speeds), found.status > 0,
         )  # fmt: skip
 
     @cached_property
@@ -367,28 +393,59 @@ class _Shooting:
                 out[:, count + 2 * k + which] = (self.residual(own, own_states) - here) / step
         return out
 
-    def _covariance(self, jacobian: Array, residual: Array) -> Array:
-        """Cluster-robust covariance: clusters are tenths of runs, first states have their noise."""
+    def _deviations(
+        self, jacobian: Array, residual: Array, terms: Sequence[Term], states: Array
+    ) -> Array:
+        """Standard deviations of the unknowns: how they follow a motion that is simulated under
+        another noise of the torque and seen with the noise of the instruments (parametric
+        bootstrap, one step of the fit each), of which one in 20 at least has errors after it as
+        small as those of the fit: what is left of a torque has noise of the acceleration too. A
+        draw whose motion ends, as by a slack cable, is left out; NaN where all end."""
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
-        unit = jacobian / scale
-        inverse = np.linalg.pinv(unit.T @ unit, hermitian=True)
-        meat, begin, clusters = np.zeros_like(inverse), 0, 0
-        for piece in self.pieces:
-            end = begin + len(piece.measured)
-            parts = _PIECES if len(self.pieces) < _PIECES else 1
-            for rows in np.array_split(np.arange(begin, end), parts):
-                gradient = unit[rows].T @ residual[rows]
-                meat += np.outer(gradient, gradient)
-                clusters += 1
-            begin = end
-        meat *= clusters / max(clusters - 1, 1)
+        unit, random = jacobian / scale, np.random.default_rng(0)
+        follow = np.linalg.pinv(unit.T @ unit, hermitian=True) @ unit.T
+        first = [states[k].tolist() for k, piece in enumerate(self.pieces) if piece.is_first]
+        runs = []
+        for one, (angle, speed) in zip(self.whole, first, strict=True):
+            setup = replace(one.setup, angle=angle, speed=speed)
+            law = law_of(self.profile, terms, setup)
+            known = motion_of(self.profile, terms, setup, _TOLERANCE, law).angle
+            spread = one.torque_noise(self.profile, terms, len(self.start), random)
+            runs.append((setup, law, known, spread))
+        samples = sum(len(piece.measured) for piece in self.pieces)
+        moved, left = [], []
+        for _ in range(_DRAWS):
+            try:
+                changes = [
+                    motion_of(
+                        self.profile, terms, noisy(setup, spread, random), _TOLERANCE, law
+                    ).angle
+                    - known
+                    for setup, law, known, spread in runs
+                ]
+            except UsageError:
+                continue
+            seen = self._seen(changes, random)
+            found = follow @ seen
+            moved.append(found / scale)
+            left.append(float(np.sum((seen - unit @ found)[:samples] ** 2)))
+        if not moved:
+            return np.full(len(scale), np.nan)
+        least = float(np.quantile(left, _UNLIKELY))
+        level = min(1.0, float(np.sum(residual[:samples] ** 2)) / least)
+        return np.asarray(np.sqrt(level * np.mean(np.square(moved), axis=0)))
+
+    def _seen(self, changes: Sequence[Array], random: np.random.Generator) -> Array:
+        """Rows of the residual that changes of the motion of each run (n,) make, with noise."""
+        rows, gaps, which = [], [], iter(zip(self.whole, changes, strict=True))
         for k, piece in enumerate(self.pieces):
-            if piece.noise is not None:
-                measured = unit[begin : begin + 2]
-                meat += self.error**2 * measured.T @ measured
-                begin += 2
-            begin += 2 * self._joins(k)
-        return np.asarray(inverse @ meat @ inverse / np.outer(scale, scale))
+            if piece.is_first:
+                one, change = next(which)
+                gaps.append(self.error * random.standard_normal(2))
+            own = np.interp(piece.setup.time, one.setup.time, change)
+            rows.append(own + one.noise[0] * random.standard_normal(len(own)))
+            gaps.append(np.zeros(2 * self._joins(k)))
+        return np.concatenate([*rows, *gaps])
 
     def _joins(self, k: int) -> bool:
         """Whether a piece has to end where the next one begins."""

@@ -43,6 +43,8 @@ PREDICTED = ("predicted_torque", "N m", "of your own model of the axis; 0 withou
 """Input of an axis in place of the load, which has the same effect there: name, unit, meaning."""
 BEFORE = "before_"
 """Prefix of the inputs of the sample before."""
+RESERVED = {*INPUTS, PREDICTED[0], *(BEFORE + name for name in INPUTS), "before", "is_started"}
+"""Names of the step itself, which no parameter or memory of an effect may have."""
 _UNTRACED = (TypeError, ValueError, AttributeError, IndexError, FileError)
 """Errors of a function that needs numbers; the effect's own error is a FileError."""
 _TEMPLATE = """\
@@ -112,6 +114,7 @@ class _Recorder:
         def with_memory(value: Any, at: At) -> Any:
             assert effect.carry is not None
             name = effect.id.replace("-", "_") + (f"_{at.pulley}" if at.pulley >= 0 else "")
+            name += "_memory" * (name in RESERVED)
             own = {**values, "start": traced(symbol(name))}
             after = act(effect, own, value, at)
             end = expression(effect.carry(after, value, at, own))
@@ -184,7 +187,7 @@ def _values(profile: WinchProfile, term: Term, constants: dict[str, Constant]) -
     for p in term.effect.parameters:
         value = term.values[p.name]
         name = f"{prefix}_{p.name}"
-        if p.whole or name in constants:
+        if p.whole or name in constants or name in RESERVED:
             found[p.name] = value
             continue
         found[p.name] = traced(symbol(name, value))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
+from winchkit.dynamics.c_code import identifier
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -30,11 +31,14 @@ def lines_of(profile: RobotProfile, catalogue: Catalogue | None) -> tuple[Robot,
     catalogue = catalogue or load_catalogue()
     robot = robot_with_effects(profile, catalogue)
     declared = [t for t in declared_terms(profile, catalogue) if t.effect.stage not in ROBOT_STAGES]
-    found = []
+    found, used = [], set[str]()
     for name, winch, length in zip(robot.names, robot.winches, robot.home_length, strict=True):
         on_line = [t for t in declared if line_of_effect(t.effect) in ("", name)]
         reference = replace(winch.reference, cable_length=float(length))
         here = replace(winch, name=f"{profile.name}-{name}", reference=reference)
+        while identifier(here.name) in used:  # As of lines 'A' and 'a'.
+            here = replace(here, name=f"{here.name}-other")
+        used.add(identifier(here.name))
         found.append(RobotLine(name, here, (*terms_of(winch, catalogue), *map(_of_winch, on_line))))
     return robot, found
 
