@@ -35,9 +35,10 @@ _NOTICEABLE = 0.02
 _LEAST_DOF = 4.0
 """Degrees of freedom that candidates must leave a band for its own variance: half of the rows of a
 wide band."""
-WELL_KNOWN = 100.0
-"""Degrees of freedom from which a band's variance is taken as known; theory: its standard deviation
-is below 14 % there, √(2/ν)."""
+_FEW_DOF = 10.0
+"""Degrees of freedom below which a variance is at least that of higher bands; screened: χ²(10) is
+below a quarter of its mean in 1 % of cases; with 25 a ripple of the friction was missed, since
+bands above contain what the search has not found yet."""
 _REWEIGHTED = 3
 """Reweighting iterations; screened."""
 _UPPER = 0.5
@@ -197,7 +198,7 @@ def _not_below_higher_bands(regression: Regression, power: Array, dof: Array) ->
         own = np.arange(first, first + len(edges) - 1)
         least = np.minimum.accumulate(power[own][::-1])[::-1]
         above = np.append(least[1:], 0.0)
-        few = dof[own] < WELL_KNOWN
+        few = dof[own] < _FEW_DOF
         power[own] = np.where(few, np.maximum(power[own], above), power[own])
     return power
 

@@ -22,7 +22,7 @@ from scipy.special import fdtri
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.noise import WELL_KNOWN, BandNoise, satterthwaite_dof
+from winchkit.diagnosis.regression.noise import BandNoise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_information
 from winchkit.diagnosis.selection.signatures import EffectShape, Signatures
 
@@ -31,6 +31,9 @@ _NOTHING = 1e-300
 _SIMULATIONS = 400
 """Draws of the null distribution of the maximum; computing cost; the 99 % quantile of 400 draws has
 a level of 1 % ± 0.5 %."""
+_WELL_KNOWN = 100.0
+"""Degrees of freedom from which a band's variance is taken as known; theory: its standard deviation
+is below 14 % there, √(2/ν)."""
 _LEVEL = 0.01
 """Level of a candidate's own quantile, over all candidates; convention: that of the largest
 score."""
@@ -150,7 +153,7 @@ class Projected:
             )
             # No Cholesky factor: columns that the model explains are zero up to rounding.
             values, vectors = np.linalg.eigh(np.block([[normal, cross], [cross.T, gram]]))
-            factor = np.sqrt(dof / random.chisquare(dof, samples)) if dof < WELL_KNOWN else 1.0
+            factor = np.sqrt(dof / random.chisquare(dof, samples)) if dof < _WELL_KNOWN else 1.0
             noise = random.standard_normal((len(values), samples)) * factor
             # Symmetric root: the draws do not depend on the signs of the eigenvectors.
             drawn = (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
@@ -165,7 +168,7 @@ class Projected:
         outputs = np.array([output for output, _, _ in self._regression.bands])
         for output in self._regression.outputs:
             own = np.flatnonzero(outputs == output)
-            known = self._dof[own] >= WELL_KNOWN
+            known = self._dof[own] >= _WELL_KNOWN
             if known.any():
                 yield output, own[known], np.inf
             for band in own[~known]:
