@@ -1,7 +1,8 @@
 """One effect that imitates two: a run of one direction, in which friction is an offset.
 
 A joint with gravity and Coulomb friction turns once from one end to the other at one speed. Its
-torque is nearly linear in the angle, as of a spring with an offset.
+torque is nearly linear in the angle, as of a spring with an offset. Where every file has one of the
+two directions, friction is an offset of each file.
 """
 
 from __future__ import annotations
@@ -57,3 +58,19 @@ def test_back_again_gravity_and_friction_are_named() -> None:
     assert "joint-gravity" in names
     assert "spring-balancer" not in names
     assert any(name.startswith("motor-") for name in names)
+
+
+def test_files_of_one_direction_each_show_friction_and_no_offset() -> None:
+    """Three files up and three down: their offsets follow the direction, as only friction does."""
+    random, time = np.random.default_rng(5), np.arange(0.0, 20.0, 0.02)
+    runs = []
+    for number, speed in enumerate((3.0, 5.0, 8.0, -3.0, -5.0, -8.0)):
+        angle = speed * (time + 0.03 * np.sin(0.7 * time))
+        torque = 0.030 * np.sign(speed) + 0.006 * random.standard_normal(len(time))
+        channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+        runs.append(Run(f"file {number}", time, channels, {}))
+    found = diagnose(runs, JOINT).diagnosis
+    assert found.verdict == "explained"
+    (step,) = found.steps
+    assert step.effects[0] == "motor-coulomb"
+    assert step.parameters["motor-coulomb"]["torque"].value == pytest.approx(0.030, abs=0.001)

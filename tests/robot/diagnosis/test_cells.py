@@ -49,3 +49,19 @@ def test_a_force_is_what_the_cell_would_show_as_measured(
     }[effect]
     assert np.allclose(said, shown[:, 1], rtol=0, atol=1e-6)
     assert np.array_equal(np.delete(force, 1, axis=1), np.delete(shown, 1, axis=1))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_characteristic_that_never_shows_the_reading_gives_finite_forces(tmp_path: Path) -> None:
+    """T − 5 kN (T/500 N)² has its extremum of 12.5 N at 25 N: no force shows more."""
+    path = tmp_path / "robot.toml"
+    path.write_text(profile_text())
+    profile = read_robot(path)
+    dataset = prepare_poses([read_run(record(CASES[0], tmp_path, "p.csv", count=12))], profile)
+    assert np.nanmin(dataset.measured.tension[:, 1]) > 12.5
+    term = Term(at_line(load_catalogue()["cell-nonlinearity"], "2"), {"quadratic": -5000.0})
+    geometry = geometry_parameters(dataset)
+    robot = robot_with_terms(profile, [term])
+    force = equations_of(dataset, geometry).forces(geometry.nominal, robot)
+    assert np.isfinite(force[:, 1]).all()
+    assert np.abs(force[:, 1]).max() < 20 * np.nanmax(dataset.measured.tension[:, 1])

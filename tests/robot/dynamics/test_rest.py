@@ -96,8 +96,9 @@ def test_what_a_rest_needs_is_named() -> None:
     two = robot_of(replace(HANGING.profile, line=HANGING.profile.line[:2]))
     with pytest.raises(UsageError, match="at least 3 do"):
         rest_poses(two, two.home)
+    unknown = replace(HANGING, platform=replace(HANGING.platform, inertia=None))
     with pytest.raises(UsageError, match=r"need \[platform\] inertia"):
-        pendulum_modes(HANGING, HANGING.home, np.full((1, 4), 50.0))
+        pendulum_modes(unknown, HANGING.home, np.full((1, 4), 50.0))
 
 
 def test_a_hanging_platform_is_planned_through_its_poses_of_rest() -> None:

@@ -35,6 +35,10 @@ _NOTICEABLE = 0.02
 _LEAST_DOF = 4.0
 """Degrees of freedom that candidates must leave a band for its own variance: half of the rows of a
 wide band."""
+_FEW_DOF = 10.0
+"""Degrees of freedom below which a variance is at least that of higher bands; screened: χ²(10) is
+below a quarter of its mean in 1 % of cases; with 25 a ripple of the friction was missed, since
+bands above contain what the search has not found yet."""
 _REWEIGHTED = 3
 """Reweighting iterations; screened."""
 _UPPER = 0.5
@@ -178,7 +182,25 @@ def noise_saturated(
     power = _power(regression, left, bands, dof)
     # Of a band that the candidates explain whole, the neighbours say how large its variance can be.
     dof = np.where(dof < _LEAST_DOF, np.maximum(dof, _smooth(regression, power, dof)[1]), dof)
+    power = _not_below_higher_bands(regression, power, dof)
     return BandNoise(power, dof, _rms(regression, power), from_repeats=False)
+
+
+def _not_below_higher_bands(regression: Regression, power: Array, dof: Array) -> Array:
+    """Variances with those of few degrees of freedom at least the smallest one of the bands above.
+
+    Candidates explain most of what a band of few rows has, by chance too, so that its variance may
+    be a hundredth of the noise and its weight decides every fit and cross-validation. The noise of
+    instruments does not fall towards low frequencies.
+    """
+    power = power.copy()
+    for first, edges in _edges(regression).values():
+        own = np.arange(first, first + len(edges) - 1)
+        least = np.minimum.accumulate(power[own][::-1])[::-1]
+        above = np.append(least[1:], 0.0)
+        few = dof[own] < _FEW_DOF
+        power[own] = np.where(few, np.maximum(power[own], above), power[own])
+    return power
 
 
 def _inner_products(

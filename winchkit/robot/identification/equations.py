@@ -79,9 +79,9 @@ _STEP = 1e-3
 """Step of a forward difference by an effect's coordinate; numerical."""
 _NEWTON_STEPS, _FORCE_TOLERANCE = 8, 1e-9
 """Steps from a cell's reading to a force, and its relative tolerance; numerical."""
-_FORCE_STEP, _LEAST_SLOPE = 1e-4, 0.05
-"""Step of a derivative by the force, over the largest force, and the smallest slope of a cell that
-is divided by; numerical."""
+_FORCE_STEP, _LEAST_SLOPE, _LARGEST_STEP = 1e-4, 0.05, 1.0
+"""Step of a derivative by the force, over the largest force, the smallest slope of a cell that is
+divided by, and the largest step of the force over the largest one; numerical."""
 
 
 @dataclass(frozen=True)
@@ -459,7 +459,9 @@ def _force_behind(line: Line, at: At, shown: Array) -> Array:
         if np.nanmax(np.abs(missing), initial=0.0) < _FORCE_TOLERANCE * size:
             break
         slope = (line.readings(force + step, at) - here) / step
-        force = force + missing / np.maximum(slope, _LEAST_SLOPE)
+        change = missing / np.maximum(slope, _LEAST_SLOPE)
+        # A characteristic with an extremum has no force beyond it: unlimited steps overflow there.
+        force = force + np.clip(change, -_LARGEST_STEP * size, _LARGEST_STEP * size)
     return force
 
 

@@ -2,8 +2,9 @@
 
 Rows of a log are averaged over blocks in which no cable moves by more than 5 mm, a filter that all
 channels pass alike. The platform's motion is that of the motor angles by the profile without
-effects, smoothed; its derivatives give the inertial forces and the distance by which a delayed
-tracker lags. Samples that lack a channel take part in the motion and are not compared.
+effects, or the measured one of a platform that hangs on few cables and can swing, smoothed; its
+derivatives give the inertial forces and the distance by which a delayed tracker lags. Samples that
+lack a channel take part in the motion and are not compared.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from scipy.interpolate import CubicSpline
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged
 from winchkit.errors import Fault, RunError
-from winchkit.model.line import Line
-from winchkit.model.rotation import rotation_by, rotation_vector
+from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
 from winchkit.robot.dynamics.smoothed_motion import SmoothedMotion, smoothed_motion
 from winchkit.robot.files.holds import averaged
 from winchkit.robot.files.poses import MeasuredPoses, MotionSamples, joined
 from winchkit.robot.geometry.kinematics import Pose
-from winchkit.robot.geometry.robot import robot_of
+from winchkit.robot.geometry.robot import Robot, robot_of
+from winchkit.robot.geometry.tracker import pose_behind
 from winchkit.robot.geometry.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 
@@ -118,8 +119,8 @@ def trajectory_of(
     robot = robot_of(profile)
     rows = samples.measured
     parts, times, rates, motions, faults = [], [], [], [], []
-    stride = max(1, -(-sum(map(len, _blocks(samples, robot.lines))) // _MOST))
-    for number, blocks in enumerate(_blocks(samples, robot.lines)):
+    stride = max(1, -(-sum(map(len, _blocks(samples, robot))) // _MOST))
+    for number, blocks in enumerate(_blocks(samples, robot)):
         kept = blocks[::stride]
         place = str(rows.place[blocks[0].start]).partition(" of ")[2] if blocks else ""
         if len(kept) < _LEAST:
@@ -140,9 +141,16 @@ def trajectory_of(
             continue
         moving = int(np.argmax(np.ptp(angle, axis=0)))
         spline = SmoothingSpline.fit(time, angle[:, moving])
-        motions.append(smoothed_motion(spline, found.pose))
+        part = _averaged(rows, kept, angle, number)
+        seen = _swinging(robot, part, found.pose) if robot.hangs else None
+        if seen is None:
+            motions.append(smoothed_motion(spline, found.pose))
+        else:
+            most = int(np.argmax(np.ptp(seen.position, axis=0)))
+            own = SmoothingSpline.fit(time, seen.position[:, most])
+            motions.append(smoothed_motion(own, seen))
         rates.append(np.stack([spline.smoothed(column, 1) for column in angle.T], axis=1))
-        parts.append(_averaged(rows, kept, angle, number))
+        parts.append(part)
         times.append(time)
     if faults:
         raise RunError(faults)
@@ -156,16 +164,34 @@ def trajectory_of(
     return measured, motion
 
 
-def _blocks(samples: MotionSamples, lines: tuple[Line, ...]) -> list[list[slice]]:
-    """Blocks of rows of each run, of equal length, in which no cable moves by more than 5 mm."""
+def _swinging(robot: Robot, measured: MeasuredPoses, still: Pose) -> Pose | None:
+    """Measured poses of a hanging platform, which swings beside the pose of equilibrium that its
+    motor angles determine (``still``, where a reading is missing); None where few were measured."""
+    readings = np.hstack([measured.position, measured.angles])
+    known = np.all(np.isfinite(readings), axis=1, keepdims=True)
+    if np.mean(known) < _LEAST_KNOWN:
+        return None
+    seen = Pose(measured.position, rotation_of(*np.nan_to_num(measured.angles).T))
+    if robot.tracker is not None:
+        seen = pose_behind(robot.tracker, seen)
+    position = np.where(known, seen.position, still.position)
+    return Pose(position, np.where(known[..., None], seen.rotation, still.rotation))
+
+
+def _blocks(samples: MotionSamples, robot: Robot) -> list[list[slice]]:
+    """Blocks of rows of each run, of equal length, in which no cable, nor a hanging platform, moves
+    by more than 5 mm."""
     rows, out = samples.measured, []
     for number in range(int(rows.run.max()) + 1):
         own = np.flatnonzero(rows.run == number)
         angle = _bridged(rows.motor_angle[own])
         travel = max(
             float(np.quantile(np.abs(np.diff(angle[:, i])), 0.99)) * abs(line.arm(0.0))
-            for i, line in enumerate(lines)
+            for i, line in enumerate(robot.lines)
         )
+        moved = np.linalg.norm(np.diff(rows.position[own], axis=0), axis=1)
+        if robot.hangs and np.isfinite(moved).any():
+            travel = max(travel, float(np.nanquantile(moved, 0.99)))
         size = int(np.clip(_TRAVEL / max(travel, 1e-9), 1, max(1, len(own) // _LEAST)))
         first = int(own[0])
         out.append([slice(at, at + size) for at in range(first, first + len(own) - size + 1, size)])
