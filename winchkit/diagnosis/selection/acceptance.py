@@ -2,14 +2,13 @@
 
 An addition is accepted where its held-out χ² decreases block by block (Wilcoxon signed-rank test)
 or in every group of programme and load by more than the penalty, and where it decreases some
-held-out error by at least 2 %.
+held-out error by at least 2 %. An error that it raises by more has to be outweighed ten times.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import (
     CERTAIN,
     held_out,
@@ -29,7 +28,7 @@ _LEVEL = 0.02
 MIN_GAIN = 2.0
 """Minimum decrease of the criterion for a change of the model."""
 _NO_WORSE = 1.02
-"""Ratio of held-out errors that no output may reach; screened."""
+"""Ratio of held-out errors that an output reaches only where the others outweigh it; screened."""
 RELEVANT_RATIO = 0.98
 """Ratio of held-out errors after and before, below which an addition is relevant; screened."""
 
@@ -93,9 +92,14 @@ def is_accepted(
         signed_rank_p_value(before, after) > _LEVEL and not gains_in_every_group
     ):
         return False
-    ratios = _error_ratios((engine, larger, noise), (engine, present, noise), groups)
+    now, was = (held_out_rms(regression, fitted, noise, groups) for fitted in (larger, present))
+    ratios = [now[output] / was[output] for output in was]
     # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
-    return bool(np.sum(gain) > 0 and min(ratios) < largest_ratio and max(ratios) < _NO_WORSE)
+    if np.sum(gain) <= 0 or min(ratios) >= largest_ratio:
+        return False
+    falls = [(was[o] ** 2 - now[o] ** 2) / noise.rms[o] ** 2 for o in was if noise.rms[o]]
+    rise = -sum(fall for fall in falls if fall < 0.0)
+    return max(ratios) < _NO_WORSE or rise < CERTAIN * (sum(falls) + rise)
 
 
 def _added(present: Fit, larger: Fit) -> int:
@@ -111,13 +115,8 @@ def predicts_better(new: Fitted, old: Fitted) -> bool:
     """Whether a fit predicts held-out blocks of time of some output relevantly better than another
     fit of the same runs, with other nuisance parameters or excluded samples.
     """
-    return min(_error_ratios(new, old)) < RELEVANT_RATIO
-
-
-def _error_ratios(new: Fitted, old: Fitted, folds: Folds | None = None) -> list[float]:
-    """Held-out errors of a fit over those of another, by output; by default in blocks of time."""
     now, was = (
-        held_out_rms(engine.regression, fitted, noise, folds or engine.regression.blocks)
+        held_out_rms(engine.regression, fitted, noise, engine.regression.blocks)
         for engine, fitted, noise in (new, old)
     )
-    return [now[output] / was[output] for output in was]
+    return min(now[output] / was[output] for output in was) < RELEVANT_RATIO

@@ -1,9 +1,9 @@
 """Simplification of a selected model: nested laws, and steps without which nothing is lost.
 
-A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs is
-that of a simpler effect (``Effect.reduces_to``), which takes its place where it explains nine
-tenths as much; so it does where the refitted model with it predicts every output as well, to 2 %. A
-step is left out where the model without it does.
+A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs, such
+as a Stribeck speed above the highest one, is that of a simpler effect (``Effect.reduces_to``),
+which takes its place where it explains nine tenths as much; so it does where the refitted model
+with it predicts every output as well, to 2 %. A step is left out where the model without it does.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from winchkit.diagnosis.regression.cross_validation import (
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -78,7 +79,19 @@ def is_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise, index:
         return False
     spread = spread_of(engine.regression, fitted, noise, engine.regression.blocks, index)
     term, values = estimates(engine.regression, fitted, spread)[index]
-    return reduced_law(term, values, engine.profile)
+    return reduced_law(term, values, engine.profile, _fastest(engine))
+
+
+def _fastest(engine: SelectionEngine) -> Mapping[str, float]:
+    """Highest speed of the runs by its unit; none of a robot's poses."""
+    regression = engine.regression
+    if not isinstance(regression, TimeSeriesRegression):
+        return {}
+    motions = regression.motions
+    return {
+        "rad/s": max(float(np.max(np.abs(motion.motor_rate))) for motion in motions),
+        "m/s": max(float(np.max(np.abs(motion.speed))) for motion in motions),
+    }
 
 
 def _lost_share(
@@ -121,23 +134,35 @@ def _is_missed(engine: SelectionEngine, smaller: Fit, present: Fit, noise: BandN
     return any(errors[output] > _DOUBLED * now[output] for output in now)
 
 
-def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
+def reduced_law(
+    term: Term,
+    values: Mapping[str, Estimate],
+    profile: WinchProfile | None,
+    fastest: Mapping[str, float],
+) -> bool:
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
     It is determined where its interval of one standard deviation is above zero and ends before the
-    largest plausible value; a series where one of its coefficients is.
+    largest plausible value, that of a speed before the highest in the runs; a series where one of
+    its coefficients is.
     """
     shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
     if not shapes:
         return False
     if shape_at_bound(term) or any(implausible_value(p, values[p.name], profile) for p in shapes):
         return True
-    return not any(_is_determined(p, values[p.name], profile) for p in shapes)
+    return not any(_is_determined(p, values[p.name], profile, fastest) for p in shapes)
 
 
-def _is_determined(parameter: Parameter, estimate: Estimate, profile: WinchProfile | None) -> bool:
+def _is_determined(
+    parameter: Parameter,
+    estimate: Estimate,
+    profile: WinchProfile | None,
+    fastest: Mapping[str, float],
+) -> bool:
     known = plausible_range(parameter, profile)
-    size, high = abs(estimate.value), parameter.high if known is None else known[1]
+    high = min(parameter.high if known is None else known[1], fastest.get(parameter.unit, np.inf))
+    size = abs(estimate.value)
     return estimate.std < min(size, high - size)
 
 
