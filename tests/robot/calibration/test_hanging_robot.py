@@ -21,7 +21,12 @@ from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.files.poses import MeasuredPoses
-from winchkit.robot.forces.balance import hanging_balance, hanging_residual, wrench_scale
+from winchkit.robot.forces.balance import (
+    hanging_balance,
+    hanging_residual,
+    resting_balance,
+    wrench_scale,
+)
 from winchkit.robot.geometry.pose_estimation import moved_pose
 from winchkit.robot.mistakes.search import mistakes_in
 from winchkit.schema.profiles.robot import PriorSpec
@@ -135,6 +140,47 @@ def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None
     before, after = rms(found.validation_before.distance), rms(found.validation_after.distance)
     assert before > 2e-3
     assert after < before / (10 if rotations else 3)
+
+
+def test_positions_alone_determine_a_robot_whose_weight_is_known() -> None:
+    """Without rotations and forces, no forces of the cables may be at odds with the weight."""
+    own, measured = hanging()
+    own = robot_of(replace(own.profile, platform=replace(own.profile.platform, mass=MASS)))
+    fit, held = split(replace(measured, angles=np.full_like(measured.angles, np.nan)))
+    found = calibrate(own, fit, held)
+    assert found.equations.rests
+    assert rms(found.validation_after.distance) < 1e-4
+    assert found.refusal == ""
+
+
+def test_no_force_is_left_of_a_platform_at_rest() -> None:
+    """Two rows of a platform on four cables, against the measured poses at rest."""
+    own, _ = hanging()
+    rng = np.random.default_rng(4)
+    _, seen, _ = at_rest(rng, 5, 0.1)
+    geometry = replace(
+        own.geometry,
+        exit_point=np.array(truth().exit),
+        anchor_point=np.array(truth().anchor),
+        swivel_radius=np.array(truth().swivel[:ROPES]),
+    )
+    platform = replace(own.platform, mass=MASS, center_of_mass=tuple(CENTRE.tolist()))
+    pose = Pose(seen[:, :3], rotation_of(*seen[:, 3:].T))
+    found = resting_balance(geometry, pose, platform)
+    assert found.residual.shape == (5, 2)
+    assert np.max(np.abs(found.residual)) < 1e-4
+    tilted = moved_pose(pose, np.tile([0, 0, 0, 0.01, 0.02, 0], (5, 1)))
+    found = resting_balance(geometry, tilted, platform)
+    assert np.min(np.max(np.abs(found.residual), axis=1)) > 0.5
+    for index in range(6):
+        step = np.zeros((5, 6))
+        step[:, index] = 1e-5
+        # The rows are a basis; their sum of squares does not depend on which.
+        moved = [moved_pose(tilted, by) for by in (step, -step)]
+        high, low = (resting_balance(geometry, at, platform).residual for at in moved)
+        expected = 2 * np.sum(found.residual * found.by_pose[..., index], axis=1)
+        slope = np.sum(high**2 - low**2, axis=1) / 2e-5
+        np.testing.assert_allclose(slope, expected, atol=1e-3)
 
 
 def test_lengths_at_home_of_a_hanging_robot_are_tried() -> None:

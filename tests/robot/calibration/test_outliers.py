@@ -8,14 +8,21 @@ import numpy as np
 import pytest
 
 from calibration_cases import elastic_rows, held, measured, robot, rows
+from robot_poses.mistaken import Scene, recorded
 from robot_poses.truth import csv
+from winchkit.catalog import find
 from winchkit.errors import RunError
 from winchkit.model.rotation import rotation_by
 from winchkit.robot import robot_of
-from winchkit.robot.calibration.calibrate import calibrate, split
-from winchkit.robot.calibration.prediction import rms
+from winchkit.robot.calibration.calibrate import calibrate, equations_of, split
+from winchkit.robot.calibration.options import Options
+from winchkit.robot.calibration.prediction import in_other_zeros, rms
 from winchkit.robot.files.poses import MeasuredPoses
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, place
+from winchkit.robot.identification.variance_components import START
 from winchkit.schema.profiles.instruments import InstrumentSpec, TrackerSpec
+from winchkit.schema.read import read_robot
 
 FRAME = rotation_by(np.array([[0.3, -0.5, 2.0]]))[0]
 SHIFT = np.array([1.2, -0.7, 0.4])
@@ -79,6 +86,22 @@ def test_a_wrong_motor_angle_is_a_gross_error_as_well() -> None:
 def test_poses_without_gross_errors_are_all_used(count: int) -> None:
     found = calibrate(robot(), measured(csv(rows(count, SEED))), held())
     assert found.gross_errors == ()
+
+
+def test_a_pose_in_another_zero_of_the_lengths_is_no_gross_error() -> None:
+    """Positions alone: from far tilts the cables of one of 40 poses close at a wrong rotation."""
+    own = robot_of(read_robot(find("profiles", "winding-device-8")))
+    fit = measured(recorded(Scene("winding-device-8", True, False, 40, 2e-5, 1e-3, 5)).csv())
+    equations = equations_of(own, fit, Options())
+    values, weights = equations.parameters.nominal, Weights(START)
+    right = place(equations, BundleState(values, equations.start(values)), weights)
+    tilted = rotation_by(np.tile([1.0, 1.0, 0.0], (40, 1))) @ right.pose.rotation
+    wrong = place(equations, BundleState(values, Pose(right.pose.position, tilted)), weights)
+    off = np.abs(wrong.pose.rotation - right.pose.rotation).max(axis=(1, 2))
+    assert np.count_nonzero(off > 0.1) >= 1
+    found, changed = in_other_zeros(equations, wrong, weights)
+    assert changed
+    assert np.abs(found.pose.rotation - right.pose.rotation).max() < 1e-6
 
 
 def test_an_effect_that_the_model_lacks_makes_no_gross_errors() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.robot.calibration.prediction import in_other_zeros
 from winchkit.robot.identification.bundle_adjustment import (
     BundleState,
     Solution,
@@ -17,7 +18,7 @@ from winchkit.robot.identification.bundle_adjustment import (
     solve,
 )
 from winchkit.robot.identification.equations import RobotEquations
-from winchkit.robot.identification.variance_components import NOISE
+from winchkit.robot.identification.variance_components import NOISE, START
 
 _LIMIT = 10.0
 """Misfit of a pose in that of the usual pose from which on it is a gross error; the largest of ten
@@ -51,7 +52,8 @@ def gross_errors(equations: RobotEquations, values: Array, weights: Weights) -> 
     residuals, in standard deviations of their prediction by the others, where it fits them best. P.
     J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
     """
-    state = place(equations, BundleState(values, equations.start(values)), weights)
+    state = place(equations, BundleState(values, equations.start(values)), Weights(START))
+    state, _ = in_other_zeros(equations, place(equations, state, weights), weights)
     weights = _robust_weights(equations, state)
     state = place(equations, state, weights)
     information = linearise(equations, state, weights).information

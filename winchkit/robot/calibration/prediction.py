@@ -14,12 +14,19 @@ from winchkit.robot.files.poses import held_unmeasured
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import reading_of, registered
-from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, place
+from winchkit.robot.identification.bundle_adjustment import (
+    BundleState,
+    Weights,
+    linearise,
+    place,
+)
 from winchkit.robot.identification.equations import RobotEquations
 
 _ROUNDS = 4
 """Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
 the elongation."""
+_CLEARLY_BETTER = 9.0
+"""Fall of a pose's χ² from which another rotation is taken; a smaller one is no other zero."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,33 @@ def predicted_poses(equations: RobotEquations, values: Array, start: Pose | None
         # A search that did not converge starts again from home.
         start = _where(found.converged, found.pose, equations)
     return found.pose
+
+
+def in_other_zeros(
+    equations: RobotEquations, state: BundleState, weights: Weights
+) -> tuple[BundleState, bool]:
+    """The state with the poses that forward kinematics finds where these fit better, and whether
+    any does. Without a measured rotation the cables close at several ones, and a pose that starts
+    from the rotation at home may end in a wrong one."""
+    if "rotation" in equations.kinds or "closure" not in equations.kinds:
+        return state, False
+    found = predicted_poses(equations, state.values)
+    known = np.isfinite(found.position[:, 0])
+    other = Pose(
+        np.where(known[:, None], found.position, state.pose.position),
+        np.where(known[:, None, None], found.rotation, state.pose.rotation),
+    )
+    trial = place(equations, BundleState(state.values, other), weights)
+    left, before = (
+        np.sum(linearise(equations, own, weights).stack.residual ** 2, axis=1)
+        for own in (trial, state)
+    )
+    better = left < before - _CLEARLY_BETTER
+    pose = Pose(
+        np.where(better[:, None], trial.pose.position, state.pose.position),
+        np.where(better[:, None, None], trial.pose.rotation, state.pose.rotation),
+    )
+    return BundleState(state.values, pose), bool(np.any(better))
 
 
 def _reading(equations: RobotEquations, values: Array, pose: Pose) -> Pose:

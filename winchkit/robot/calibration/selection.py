@@ -30,6 +30,7 @@ from winchkit.robot.calibration.options import Options, ProgressCallback
 from winchkit.robot.calibration.prediction import (
     PoseErrors,
     errors_at,
+    in_other_zeros,
     predicted_poses,
     rms,
 )
@@ -463,6 +464,9 @@ def fitted(
         equations, state = _continued(equations, from_fit)
         weights = Weights({**_sigma(equations, options), **from_fit.weights.sigma})
     solution = solve(equations, state, weights, _reporter(progress, "fit"))
+    state, changed = in_other_zeros(equations, solution.state, weights)
+    if changed:
+        solution = solve(equations, state, weights, _reporter(progress, "refit"))
     for _ in range(_NOISE_ROUNDS):
         found = re_estimated_weights(solution, weights, given)
         if _settled(found.sigma, weights.sigma):

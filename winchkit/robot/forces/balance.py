@@ -131,3 +131,27 @@ def hanging_balance(
 def _all_lines(part: Array) -> Array:
     """(p, n, 6, k) as the columns of all lines beside each other, (p, 6, n k)."""
     return np.moveaxis(part, 1, 2).reshape(len(part), 6, -1)
+
+
+def resting_balance(
+    geometry: Geometry, pose: Pose, platform: PlatformSpec, inertial: Array | float = 0.0
+) -> Constraint:
+    """:func:`hanging_balance` without measured forces: the part of the wrench that no forces of
+    cables and guides carry, (p, k, ...), N. The forces are those that leave least of it, whose
+    derivatives do not count to the first order (variable projection, Kaufman's form)."""
+    scale = wrench_scale(geometry)
+    pulls = scale[:, None] * structure_matrix(geometry, pose.position, pose.rotation)
+    weight = scale * (gravity_wrench(platform, pose.rotation) + inertial)
+    guides = np.eye(6)[:, ~np.asarray(geometry.free, dtype=bool)]
+    held = np.broadcast_to(guides, (len(pulls), *guides.shape))
+    carried = np.nan_to_num(np.concatenate([pulls, held], axis=2))
+    tension = -(np.linalg.pinv(carried) @ weight[..., None])[:, : pulls.shape[2], 0]
+    left, _, _ = np.linalg.svd(carried)
+    uncarried = np.swapaxes(left[..., carried.shape[2] :], 1, 2)
+    found = hanging_balance(geometry, pose, tension, platform, inertial)
+    return Constraint(
+        (uncarried @ found.residual[..., None])[..., 0],
+        uncarried @ found.by_pose,
+        {},
+        {name: uncarried @ part for name, part in found.by_robot.items()},
+    )

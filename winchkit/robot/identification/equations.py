@@ -30,6 +30,7 @@ from winchkit.robot.forces.balance import (
     force_basis,
     hanging_balance,
     hanging_residual,
+    resting_balance,
     wrench_residual,
 )
 from winchkit.robot.forces.elongation import strain_of
@@ -148,9 +149,18 @@ class RobotEquations(ParametrizedRobot):
     @property
     def hangs(self) -> bool:
         """Whether measured cable forces and a known weight determine the pose of the platform."""
-        few = self.robot.hangs and self.robot.platform.mass > 0
         known = np.any(np.all(np.isfinite(self.measured.tension), axis=1))
-        return few and self.balanced is not False and bool(known)
+        return self._weighed and bool(known)
+
+    @property
+    def rests(self) -> bool:
+        """Whether its known weight, without measured forces and rotations, restricts the pose."""
+        given = np.isfinite(self.measured.tension).any() or np.isfinite(self.measured.angles).any()
+        return self._weighed and not given
+
+    @property
+    def _weighed(self) -> bool:
+        return self.robot.hangs and self.robot.platform.mass > 0 and self.balanced is not False
 
     @property
     def has_balance(self) -> bool:
@@ -159,7 +169,7 @@ class RobotEquations(ParametrizedRobot):
         if self.balanced is not None:
             return self.balanced
         block, std = self.parameters.block, self.parameters.std
-        if self.hangs or "cell_gain" in block:
+        if self.hangs or self.rests or "cell_gain" in block:
             return True
         payload = np.concatenate([std[block["payload_mass"]], std[block["payload_centre"]]])
         return bool(np.any(payload > 0) and np.any(np.isfinite(self.measured.tension)))
@@ -386,6 +396,8 @@ class RobotEquations(ParametrizedRobot):
 
     def _balance(self, values: Array, robot: Robot, pose: Pose) -> Constraint:
         force, inertial = self.forces(values, robot), self.inertial(robot)
+        if self.rests:
+            return resting_balance(robot.geometry, pose, robot.platform, inertial)
         if self.hangs:
             found = hanging_balance(robot.geometry, pose, force, robot.platform, inertial)
         else:
