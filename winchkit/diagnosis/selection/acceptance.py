@@ -97,9 +97,12 @@ def is_accepted(
     # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
     if np.sum(gain) <= 0 or min(ratios) >= largest_ratio:
         return False
+    if max(ratios) < _NO_WORSE:
+        return True
+    # What an effect raises that takes another's place belongs to that one.
     falls = [(was[o] ** 2 - now[o] ** 2) / noise.rms[o] ** 2 for o in was if noise.rms[o]]
     rise = -sum(fall for fall in falls if fall < 0.0)
-    return max(ratios) < _NO_WORSE or rise < CERTAIN * (sum(falls) + rise)
+    return {*present.labels} <= {*larger.labels} and rise < CERTAIN * (sum(falls) + rise)
 
 
 def _added(present: Fit, larger: Fit) -> int:

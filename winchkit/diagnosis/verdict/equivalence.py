@@ -142,7 +142,7 @@ def equivalence_set(
         joins = (
             not worse
             and not (wider and _adds_nothing(member, members[0]))
-            and not is_degenerate(engine, fitted, dispersed, len(fitted.hypothesis.terms) - 1)
+            and not _is_last_degenerate(engine, fitted, dispersed)
         )
         if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(member)
@@ -163,7 +163,9 @@ def equivalence_set(
         members += [
             m
             for m in beside
-            if m is not None and not _predicts_worse(engine, m.compared, losses, dispersed)
+            if m is not None
+            and not _predicts_worse(engine, m.compared, losses, dispersed)
+            and not _is_last_degenerate(engine, m.fit, dispersed)
         ]
     members, further = _at_most_four(members, own)
     projected = engine.projected(base, dispersed)
@@ -176,6 +178,11 @@ def equivalence_set(
     fits = tuple(member.fit for member in members)
     names = tuple(term.effect.id for term in terms)
     return EquivalenceSet(own, names, terms, fits, angles, further)
+
+
+def _is_last_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> bool:
+    """Whether the law of a fit's last effect is a simpler one."""
+    return is_degenerate(engine, fitted, noise, len(fitted.hypothesis.terms) - 1)
 
 
 @dataclass(frozen=True)
