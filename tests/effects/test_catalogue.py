@@ -22,6 +22,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "layer-thickness": {"thickness_error": ("m", 0)},
     "drum-eccentricity": {"eccentricity": ("m", 0), "phase": ("rad", SHAPE)},
     "drum-roundness": {"amplitude": ("m", 0), "phase": ("rad", SHAPE), "lobes": ("1", SHAPE)},
+    "pulley-eccentricity": {"amplitude": ("m", 0), "phase": ("rad", SHAPE), "pulley": ("1", SHAPE)},
     "gear-backlash": {"gap": ("rad", 0), "held": ("1", 1)},
     "gear-transmission-error": {
         "amplitude": ("rad", 0),

@@ -17,7 +17,7 @@ from winchkit.model.line import Line
 
 G = 9.80665
 RADIUS, GROWTH, RATIO, DEAD, LENGTH, TURNS = 0.06, 0.006, 20.4, 1.5, 6.0, 4.3
-WRAPS = (pi / 2, pi)
+WRAPS, PULLEY = (pi / 2, pi), 0.04
 INCLINATION = pi / 3
 PAYLOAD = 5.0
 
@@ -194,6 +194,12 @@ def _roundness() -> dict[str, np.ndarray]:
     return {"cable_length": X.free - wave, "motor_torque": X.T * (X.arm + slope)}
 
 
+def _pulley_runout() -> dict[str, np.ndarray]:
+    turned = (LENGTH - X.free) / PULLEY - 0.7
+    arm = X.arm * (1 + 3e-4 / PULLEY * np.cos(turned))
+    return {"cable_length": X.free - 3e-4 * (np.sin(turned) + sin(0.7)), "motor_torque": X.T * arm}
+
+
 def _transmission_error() -> dict[str, np.ndarray]:
     phi = X.phi + 3e-4 * np.sin(3 * X.theta + 0.4)
     slope = 1 / RATIO + 9e-4 * np.cos(3 * X.theta + 0.4)
@@ -225,6 +231,7 @@ CASES: dict[str, Case] = {
     "layer-thickness": ({"thickness_error": -2e-4}, _thickness_error),
     "drum-eccentricity": ({"eccentricity": 3e-4, "phase": 0.7}, _eccentricity),
     "drum-roundness": ({"amplitude": 3e-4, "phase": 0.7, "lobes": 2}, _roundness),
+    "pulley-eccentricity": ({"amplitude": 3e-4, "phase": 0.7, "pulley": 2}, _pulley_runout),
     "gear-backlash": ({"gap": 0.01, "held": 0.0}, _backlash),
     "gear-transmission-error": ({"amplitude": 3e-4, "phase": 0.4, "order": 3}, _transmission_error),
     "encoder-slip": (

@@ -164,10 +164,9 @@ def with_standing(
     if standing.remaining:
         doubts.append(Doubt("remaining", standing.remaining))
     if standing.rounded:
-        what = (
-            f"the simpler {standing.rounded} explains nine tenths of it, if friction may build up "
-            "gradually at a reversal"
-        )
+        what = f"the simpler {standing.rounded} explains nine tenths of it"
+        if "friction" in result.final.hypothesis.terms[index].effect.family:
+            what += ", if friction may build up gradually at a reversal"
         doubts.append(Doubt("reversal", what))
     if small:
         what = "another step explains ten times as much there: this may be an error of its law"

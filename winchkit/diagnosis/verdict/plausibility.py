@@ -34,15 +34,19 @@ def implausible(
     another effect, such as a spring or an offset of Dahl's. The inertia of an axis has no range: it
     includes the arm or carriage that the axis moves.
     """
+    advice = _OTHER_LAW if term.effect.reduces_to else _CHECK
     reasons = (
-        implausible_value(term.effect.parameter(name), estimate, profile)
+        implausible_value(term.effect.parameter(name), estimate, profile, advice)
         for name, estimate in values.items()
     )
     return next((reason for reason in reasons if reason is not None), None)
 
 
 def implausible_value(
-    parameter: Parameter, estimate: Estimate, profile: WinchProfile | None
+    parameter: Parameter,
+    estimate: Estimate,
+    profile: WinchProfile | None,
+    what_to_do: str = _CHECK,
 ) -> str | None:
     """Reason why one value is implausible; None where it is plausible."""
     if parameter.whole or not isfinite(estimate.value):
@@ -51,17 +55,17 @@ def implausible_value(
     known = plausible_range(parameter, profile)
     judged = parameter.role == "shape" or isfinite(estimate.std)
     if known is not None and judged and _is_held(estimate.value, known[:2], parameter):
-        advice = _OTHER_LAW if parameter.role == "shape" else _CHECK
+        advice = _OTHER_LAW if parameter.role == "shape" else what_to_do
         return f"{shown} is at the end of the plausible range ({known[2]}): {advice}"
     if not isfinite(estimate.std):
         return None
     if _is_held(estimate.value, (parameter.low, parameter.high), parameter):
-        return f"{shown} is at a bound of the fit: {_CHECK}"
+        return f"{shown} is at a bound of the fit: {what_to_do}"
     low, high, reason = known or (-inf, inf, "")
     bottom, top = estimate.interval or (estimate.value, estimate.value)
     if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
         span = f"{_text(low, parameter)} to {_text(high, parameter)}"
-        return f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
+        return f"{shown} is beyond the plausible range ({span}; {reason}): {what_to_do}"
     return None
 
 

@@ -183,6 +183,53 @@ DRUM_ROUNDNESS = Effect(
     polar=("amplitude", "phase"),
 )
 
+
+def _pulley_eccentricity(path: Path, at: At, values: Values) -> Path:
+    """Wound length plus a (sin(ℓ/R − p) + sin p), and its derivative; a missing pulley is round."""
+    pulleys, number = at.profile.pulley, int(values["pulley"])
+    if number > len(pulleys):
+        return path
+    size, phase, radius = values["amplitude"], values["phase"], pulleys[number - 1].radius
+    turned = path.value / radius - phase
+    return Path(
+        path.value + size * (np.sin(turned) + np.sin(phase)),
+        path.slope * (1.0 + size / radius * np.cos(turned)),
+    )
+
+
+PULLEY_ECCENTRICITY = Effect(
+    id="pulley-eccentricity",
+    stage=Stage.WOUND,
+    parameters=(
+        Parameter("amplitude", "m", null=0.0, typical=2e-4, low=0.0, high=0.02),
+        Parameter("phase", "rad", null=0.0, typical=1.0),
+        Parameter(
+            "pulley",
+            "1",
+            null=1.0,
+            typical=1.0,
+            low=1.0,
+            high=12.0,
+            role="shape",
+            grid=(1.0, 2.0, 3.0),
+            whole=True,
+        ),
+    ),
+    apply=_pulley_eccentricity,
+    outputs=("cable_length", "motor_torque"),
+    part="pulley",
+    variable="cable_length",
+    what="The axis of a pulley is not that of its groove.",
+    formula="W + a (sin(W/R − p) + sin p), R the radius of the pulley with this number",
+    source="geometry of an eccentric circle, first order in the amplitude",
+    looks_like="A sine over the length with the pulley's circumference as its period.",
+    confused_with=("drum-eccentricity", "drum-roundness", "gear-transmission-error"),
+    told_apart="The period: a turn of the pulley, not of the drum or motor.",
+    needs=("pulley",),
+    order=1,
+    polar=("amplitude", "phase"),
+)
+
 _TURN = 2 * np.pi
 
 

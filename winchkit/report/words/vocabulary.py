@@ -105,12 +105,14 @@ def effect_name(effect: str) -> str:
 
 
 def estimate_text(parameter: str, estimate: Estimate) -> str:
-    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``; order and lobes are whole numbers."""
+    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``; whole numbers have no error."""
     unit = parameter_unit(parameter, estimate.unit)
     if parameter == "order":
         return f"order {estimate.value:.0f}"
     if parameter == "lobes":
         return f"{estimate.value:.0f} lobes"
+    if parameter == "pulley":
+        return f"pulley {estimate.value:.0f}"
     return f"{parameter_name(parameter)} = {with_std(estimate.value, estimate.std, unit)}"
 
 
