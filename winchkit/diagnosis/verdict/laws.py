@@ -1,7 +1,7 @@
 """Simplification of a selected model: nested laws, and steps without which nothing is lost.
 
 A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs, such
-as a Stribeck speed above the highest one, is that of a simpler effect (``Effect.reduces_to``),
+as a Stribeck speed far above the highest one, is that of a simpler effect (``Effect.reduces_to``),
 which takes its place where it explains nine tenths as much; so it does where the refitted model
 with it predicts every output as well, to 2 %. A step is left out where the model without it does.
 """
@@ -32,6 +32,10 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
+_SEEN = 1.5
+"""Largest Stribeck speed over the highest one in the runs, within which the friction then falls by
+a third, exp(−v²); rule of thumb: where it falls by less, the curve beside viscous friction is that
+of any smooth law."""
 _DOUBLED = 2.0
 """Ratio of errors by which a step is missed: it had three quarters of the mean square."""
 
@@ -143,8 +147,8 @@ def reduced_law(
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
     It is determined where its interval of one standard deviation is above zero and ends before the
-    largest plausible value, that of a speed before the highest in the runs; a series where one of
-    its coefficients is.
+    largest plausible value, and a speed is near those of the runs; a series where one of its
+    coefficients is.
     """
     shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
     if not shapes:
@@ -161,9 +165,9 @@ def _is_determined(
     fastest: Mapping[str, float],
 ) -> bool:
     known = plausible_range(parameter, profile)
-    high = min(parameter.high if known is None else known[1], fastest.get(parameter.unit, np.inf))
-    size = abs(estimate.value)
-    return estimate.std < min(size, high - size)
+    size, high = abs(estimate.value), parameter.high if known is None else known[1]
+    is_seen = size <= _SEEN * fastest.get(parameter.unit, np.inf)
+    return is_seen and estimate.std < min(size, high - size)
 
 
 def with_simpler_law(engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> Fit:
