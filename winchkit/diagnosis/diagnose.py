@@ -270,15 +270,15 @@ def diagnose_prepared(
 
 
 def _unless_at_noise(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
-    """The result, without additions where the profile leaves no error above the noise of repeats:
-    effects appear in the frequencies at which repeats agree by chance.
-    """
+    """The result; without additions where no output that they change is above repeats' noise."""
     if not result.noise.from_repeats:
         return result
     before = (result.initial_model, result.initial_noise)
     outputs = output_fits(engine, before, before)
-    noise = {name: output.noise_rms for name, output in outputs.items()}
-    if excess({name: o.heldout_rms_after for name, o in outputs.items()}, noise) > 0.0:
+    added = [term.effect for term in result.final.hypothesis.terms[engine.n_initial_terms :]]
+    own = {str(name) for effect in added for name in effect.outputs} & set(outputs)
+    noise = {name: outputs[name].noise_rms for name in own}
+    if excess({name: outputs[name].heldout_rms_after for name in own}, noise) > 0.0:
         return result
     return replace(result, final=before[0], noise=before[1])
 

@@ -263,8 +263,13 @@ def test_an_addition_where_the_profile_leaves_no_error_above_the_noise_is_no_fin
     assert unless_at_noise(answer.engine, found) is found
     noise = replace(found.noise, rms={name: 2.0 * own for name, own in found.noise.rms.items()})
     known = replace(found, initial_model=found.final, initial_noise=noise)
-    other = replace(known, final=found.initial_model)
-    assert unless_at_noise(answer.engine, other).final is found.final
+    assert unless_at_noise(answer.engine, known).final is known.initial_model
+    changed = found.final.hypothesis.terms[-1].effect.outputs
+    own = {name: rms * (2.0 if name in changed else 0.1) for name, rms in found.noise.rms.items()}
+    elsewhere = replace(known, initial_noise=replace(found.noise, rms=own))
+    bare = replace(elsewhere, initial_model=found.initial_model)
+    assert unless_at_noise(answer.engine, elsewhere).noise is elsewhere.initial_noise
+    assert unless_at_noise(answer.engine, bare) is bare
 
 
 @pytest.mark.parametrize(
