@@ -141,3 +141,11 @@ def test_a_slow_logger_does_not_lower_the_cut_off_of_a_fast_one() -> None:
         if s.effects[0] == "motor-cogging"
     )
     assert step.parameters["motor-cogging"]["order"].value == 12
+
+
+@pytest.mark.parametrize(("ripple", "filtered"), [(3e-3, False), (0.0, True)])
+def test_an_order_above_the_highest_cut_off_is_compared(ripple: float, filtered: bool) -> None:
+    """Order 12 at 76 Hz of a logger at 167 Hz: 0.4 of the rate are 67 Hz, half of it 83 Hz."""
+    slow = [thinned(fast_motor(seed, ripple, seconds=20.0), 3) for seed in range(2)]
+    dataset = prepare(slow, AxisProfile(name="axis"))
+    assert {r.bands["motor_torque"].cut_off is not None for r in dataset.recordings} == {filtered}

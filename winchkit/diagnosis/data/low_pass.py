@@ -93,7 +93,8 @@ def cut_offs_of(
     stands: Sequence[NDArray[np.bool_]],
     motions: Sequence[Motion],
 ) -> list[float | None]:
-    """Cut-off of the torque's low-pass of every run, Hz; None for a run without a torque.
+    """Cut-off of the torque's low-pass of every run, Hz; None for a run without a torque, and where
+    an order of the motor angle is above the highest cut-off.
 
     The acceleration of a known weight by differences of samples is too small at high frequencies: 1
     % of the power may lie above the cut-off there.
@@ -113,13 +114,16 @@ def cut_offs_of(
     speed = max(float(np.max(np.abs(motion.at.motor_rate))) for motion in motions)
     weighed = any(motion.load_mass is not None for motion in motions)
     out: list[float | None] = [None] * len(runs)
-    found: dict[tuple[int, ...], float] = {}
+    found: dict[tuple[int, ...], float | None] = {}
     for index, run in compared.items():
         ratios = {other: one.rate / run.rate for other, one in compared.items()}
         alike = tuple(o for o, ratio in ratios.items() if 1 / _SAME_RATE < ratio < _SAME_RATE)
         if alike not in found:
             own_runs = [compared[other] for other in alike]
-            found[alike] = torque_cut_off(own_runs, speed, weighed * LOST_POWER)
+            cut_off = torque_cut_off(own_runs, speed, weighed * LOST_POWER)
+            highest = _HIGHEST_CUT_OFF * min(one.rate for one in own_runs)
+            lost = cut_off >= highest and removed_by_low_pass(own_runs, "", cut_off).order
+            found[alike] = None if lost else cut_off
         out[index] = found[alike]
     return out
 
