@@ -65,9 +65,10 @@ def test_every_fault_is_reported_with_its_line() -> None:
         table("cell-offset", offset="2 mm"),
         table("pulley-coulomb", friction=0.9),
         table("cell-offset", offset="1 N"),
+        table("motor-cogging", amplitude="20 mN m", order=2.5),
     )
     faults = [str(fault) for fault in check_profile(profile)]
-    assert len(faults) == 5
+    assert len(faults) == 6
     assert all(fault.startswith("winch.toml:7: ") for fault in faults)
     for fault, said in zip(
         faults,
@@ -77,13 +78,14 @@ def test_every_fault_is_reported_with_its_line() -> None:
             "'mm' is a unit of length",
             "outside 0 to 0.5",
             "twice",
+            "'2.5' must be a whole number",
         ),
         strict=True,
     ):
         assert said in fault
     with pytest.raises(FileError) as caught:
         terms_of(profile)
-    assert len(caught.value.faults) == 5
+    assert len(caught.value.faults) == 6
 
 
 def test_stages_act_in_the_order_of_the_physics_whatever_the_order_in_the_file() -> None:

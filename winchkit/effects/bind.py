@@ -101,4 +101,6 @@ def _quantity(raw: object, parameter: Parameter) -> float:
         )
     if not (isfinite(value) or value == parameter.null):
         raise UsageError(f"'{raw}' must be finite")
+    if parameter.whole and value != round(value):
+        raise UsageError(f"'{raw}' must be a whole number")
     return value

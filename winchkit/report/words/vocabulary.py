@@ -57,6 +57,8 @@ _ORDERS_SHOWN = 8
 """Amplitudes of a series in one line."""
 _MAIN_ORDERS = 0.1
 """Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
+_WHOLE = {"order": "order {:.0f}", "lobes": "{:.0f} lobes", "pulley": "pulley {:.0f}"}
+"""Whole numbers, which have no error."""
 
 
 def output_name(output: str) -> str:
@@ -105,14 +107,10 @@ def effect_name(effect: str) -> str:
 
 
 def estimate_text(parameter: str, estimate: Estimate) -> str:
-    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``; whole numbers have no error."""
+    """A parameter with its value: ``EA = 247.4 ± 6.1 kN``."""
     unit = parameter_unit(parameter, estimate.unit)
-    if parameter == "order":
-        return f"order {estimate.value:.0f}"
-    if parameter == "lobes":
-        return f"{estimate.value:.0f} lobes"
-    if parameter == "pulley":
-        return f"pulley {estimate.value:.0f}"
+    if parameter in _WHOLE:
+        return _WHOLE[parameter].format(estimate.value)
     return f"{parameter_name(parameter)} = {with_std(estimate.value, estimate.std, unit)}"
 
 
@@ -147,6 +145,8 @@ def values_text(values: Mapping[str, Estimate]) -> str:
 def interval_text(parameter: str, estimate: Estimate) -> str:
     """``95 %: 236 to 259 kN``; empty where it was not computed."""
     if estimate.interval is None or not all(isfinite(end) for end in estimate.interval):
+        return ""
+    if parameter in _WHOLE:
         return ""
     unit = parameter_unit(parameter, estimate.unit)
     scale = scale_for((estimate.value, estimate.std), unit)
