@@ -139,7 +139,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "capstan friction at a pulley",
         "the cable slides around a blocked pulley (capstan friction)",
     ),
-    "pulley-eccentricity": ("runout of a pulley", "a pulley has runout"),
+    "pulley-eccentricity": ("runout of a pulley", "the groove of a pulley has runout"),
     "pulley-coulomb": ("Coulomb friction of the pulleys", "the pulleys have Coulomb friction"),
     "pulley-dahl": (
         "presliding friction of the pulleys",
