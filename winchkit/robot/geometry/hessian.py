@@ -55,7 +55,9 @@ def direction_change(geometry: Geometry, position: Array, rotation: Array) -> Di
     outward = seen - along * axis
     distance = np.linalg.norm(outward, axis=-1, keepdims=True)
     radius = geometry.swivel_radius[:, None]
-    free = np.sqrt((distance - radius) ** 2 + along**2 - radius**2)
+    square = (distance - radius) ** 2 + along**2 - radius**2
+    # No cable leads to an anchor within its pulley.
+    free = np.sqrt(np.where(square >= 0.0, square, np.nan))
     away = outward / np.where(distance > 0, distance, 1.0)
     # On the swivel axis the limit is that of a straight cable.
     side = np.where(
