@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared
 from winchkit.model.stages import At, Path, Stage
@@ -87,13 +88,17 @@ LAYER_THICKNESS = Effect(
 )
 
 
-def _drum_eccentricity(path: Path, at: At, values: Values) -> Path:
-    """Wound length plus e (sin(φ − φ0) + sin φ0), and its derivative."""
-    size, phase = values["eccentricity"], values["phase"]
-    turned = at.drum_angle - phase
+def _with_wave(path: Path, size: float, angle: Array, phase: float, rate: Array | float) -> Path:
+    """Wound length plus a (sin(α − p) + sin p), and its derivative; ``rate`` is that of α."""
+    turned = angle - phase
     return Path(
-        path.value + size * (np.sin(turned) + np.sin(phase)), path.slope + size * np.cos(turned)
+        path.value + size * (np.sin(turned) + np.sin(phase)),
+        path.slope + size * rate * np.cos(turned),
     )
+
+
+def _drum_eccentricity(path: Path, at: At, values: Values) -> Path:
+    return _with_wave(path, values["eccentricity"], at.drum_angle, values["phase"], 1.0)
 
 
 DRUM_ECCENTRICITY = Effect(
@@ -131,13 +136,8 @@ DRUM_ECCENTRICITY = Effect(
 
 
 def _drum_roundness(path: Path, at: At, values: Values) -> Path:
-    """Wound length plus a (sin(kφ − p) + sin p), and its derivative."""
-    size, lobes, phase = values["amplitude"], values["lobes"], values["phase"]
-    turned = lobes * at.drum_angle - phase
-    return Path(
-        path.value + size * (np.sin(turned) + np.sin(phase)),
-        path.slope + size * lobes * np.cos(turned),
-    )
+    lobes = values["lobes"]
+    return _with_wave(path, values["amplitude"], lobes * at.drum_angle, values["phase"], lobes)
 
 
 DRUM_ROUNDNESS = Effect(
@@ -185,16 +185,12 @@ DRUM_ROUNDNESS = Effect(
 
 
 def _pulley_eccentricity(path: Path, at: At, values: Values) -> Path:
-    """Wound length plus a (sin(ℓ/R − p) + sin p), and its derivative; a missing pulley is round."""
+    """A pulley that is missing is round."""
     pulleys, number = at.profile.pulley, int(values["pulley"])
     if number > len(pulleys):
         return path
-    size, phase, radius = values["amplitude"], values["phase"], pulleys[number - 1].radius
-    turned = path.value / radius - phase
-    return Path(
-        path.value + size * (np.sin(turned) + np.sin(phase)),
-        path.slope * (1.0 + size / radius * np.cos(turned)),
-    )
+    radius, size = pulleys[number - 1].radius, values["amplitude"]
+    return _with_wave(path, size, path.value / radius, values["phase"], path.slope / radius)
 
 
 PULLEY_ECCENTRICITY = Effect(
