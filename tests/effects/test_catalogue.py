@@ -101,6 +101,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "width": ("rad", SHAPE),
         "transition": ("rad/s", 0),
     },
+    "load-viscous": {"viscosity": ("N s/m", 0)},
     "load-coulomb": {"force": ("N", 0), "transition": ("m/s", 0)},
     "load-friction-at-place": {
         "force": ("N", 0),

@@ -353,6 +353,7 @@ CASES: dict[str, Case] = {
         {"torque": 0.05, "place": 3.0, "width": 2.0},
         lambda: _torque(0.05 * X.sm * np.exp(-((X.phi - 3.0) ** 2) / 4.0)),
     ),
+    "load-viscous": ({"viscosity": 7}, lambda: _tension(X.T + 7 * X.v)),
     "load-coulomb": ({"force": 20.0}, lambda: _tension(X.T + 20.0 * X.s)),
     "load-friction-at-place": (
         {"force": 20.0, "place": 3.0, "width": 0.5},

@@ -26,6 +26,7 @@ from winchkit.diagnosis.residuals.attribution import (
     harmonics,
 )
 from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
+from winchkit.diagnosis.residuals.unresolved_acceleration import unresolved_acceleration
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, NextRun, OutputFit, Step
 from winchkit.diagnosis.search import (
     ProgressCallback,
@@ -372,6 +373,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     advice = _VARY if noise.from_repeats else _REPEAT
     repeat = [NextRun((), advice)] if verdict == "undecided" else []
     lost = sorted(known.refuted - known.deciding) if noise.from_repeats else []
+    late = (*unrelated(lost), *unresolved_acceleration(regression, final.residual))
     diagnosis = Diagnosis(
         verdict=verdict,
         outputs=outputs,
@@ -387,12 +389,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         ),
         where=where if verdict != "adequate" else (),
         next_runs=(*repeat, *next_runs(regression, pairs, weights_of(regression, noise))),
-        notes=(
-            *dataset.notes,
-            *missing_excitation(regression),
-            *best.notes,
-        ),
-        sanity=(*dataset.sanity, *unrelated(lost)),
+        notes=(*dataset.notes, *missing_excitation(regression), *best.notes),
+        sanity=(*dataset.sanity, *late),
         used_share=dataset.used_share,
         removed=dataset.removed,
         caveats=dataset.caveats,

@@ -198,6 +198,22 @@ def test_an_error_of_unknown_cause_is_no_evidence_against_a_rival(size: float, s
     assert len(step.effects) == sets
 
 
+@pytest.mark.parametrize(("size", "sets"), [(0.0, 1), (0.8, 2)])
+def test_an_error_of_unknown_cause_does_not_decide_between_rivals(size: float, sets: int) -> None:
+    """Crosstalk and a gain differ by the friction of the motor, by less than a wave in the cell."""
+    hidden = term("cell-gain", gain_error=0.02), term("motor-coulomb", torque=0.01)
+    ride = Ride(samples=1600, stroke=60.0)
+    wave = size * np.sin(2 * np.pi * ride.time / 1.03) ** 3
+    runs = []
+    for seed in range(4):
+        run = made(seed, GROOVED, hidden, load_mass=20.0 * (1 + seed // 2), ride=ride)
+        runs.append(with_channel(run, "tension", run["tension"] + wave))
+    names = "motor-coulomb", "cell-gain", "cell-crosstalk"
+    steps = diagnose(runs, GROOVED, Catalogue(CATALOGUE[n] for n in names)).diagnosis.steps
+    (step,) = (step for step in steps if "cell-gain" in step.effects)
+    assert len(step.effects) == sets
+
+
 class Straight(Ride):
     """A motion in one direction at one speed."""
 

@@ -53,6 +53,9 @@ _TORQUE = {"motor_torque"}
 _ONE_LOAD = 0.2
 """Range of the cable's force over its median up to which the runs have one load: less changes a
 wave by less than the tenth that establishes a law."""
+_UNKNOWN_CAUSE = 0.1
+"""Share of the squared error above the noise that a rival may add: an unknown effect with a
+correlation of 0.16 to the difference of the two would reverse it."""
 _SIGN_FLIPS = 2000
 """Random signs of the block differences; computing cost."""
 _INCOMPLETE = 0.25
@@ -198,17 +201,17 @@ class _Member:
 def _where_explained(
     engine: SelectionEngine, rival: Fit, own: Fit, noise: BandNoise, acts_on: Sequence[str]
 ) -> Array:
-    """Residual of a rival, which is that of the named model in outputs in which only the rival acts
-    and adds less to the squared error than that model leaves above the noise: an error of unknown
-    cause is no evidence against it.
+    """Residual of a rival, which is that of the named model in outputs in which it adds too little
+    to the squared error for an error of unknown cause to be evidence against it: a share of what
+    that model leaves above the noise, all of it in outputs in which only the rival acts.
     """
     regression, residual = engine.regression, rival.residual.copy()
     known = noise.power[regression.band_of_row] * regression.share_of_row
-    only = {*rival.hypothesis.terms[-1].effect.outputs} - {*acts_on}
-    for output in only & {segment.output for segment in regression.segments}:
+    for output in {*rival.hypothesis.terms[-1].effect.outputs} & {*regression.outputs}:
         rows = np.r_[tuple(regression.rows_of([output]))]
         left = float(np.sum(own.residual[rows] ** 2 - known[rows]))
-        if float(np.sum(rival.residual[rows] ** 2 - own.residual[rows] ** 2)) < left:
+        share = _UNKNOWN_CAUSE if output in acts_on else 1.0
+        if float(np.sum(rival.residual[rows] ** 2 - own.residual[rows] ** 2)) < share * left:
             residual[rows] = own.residual[rows]
     return residual
 

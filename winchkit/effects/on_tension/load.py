@@ -133,6 +133,29 @@ LOAD_COULOMB = Effect(
 )
 
 
+def _load_viscous(tension: Array, at: At, values: Values) -> Array:
+    return tension + values["viscosity"] * at.speed
+
+
+LOAD_VISCOUS = Effect(
+    id="load-viscous",
+    stage=Stage.CABLE_WEIGHT,
+    parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
+    apply=_load_viscous,
+    outputs=("tension", "motor_torque"),
+    part="load",
+    variable="speed",
+    what="The friction of the load's guide or damper is in proportion to the cable speed.",
+    formula="T + c v",
+    source="viscous friction",
+    looks_like="A tension error that is odd and linear in the speed, at any load.",
+    confused_with=("pulley-viscous", "load-coulomb"),
+    told_apart="A run of the cable without the load's guide; from dry friction, several speeds.",
+    needs=("load",),
+    order=1,
+)
+
+
 def _load_friction_at_place(tension: Array, at: At, values: Values) -> Array:
     return tension + values["force"] * cable_direction(at, values) * window(at.free_length, values)
 

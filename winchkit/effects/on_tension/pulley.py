@@ -95,7 +95,7 @@ PULLEY_VISCOUS = Effect(
     formula="T1 = T0 + c v",
     source="viscous friction",
     looks_like="A tension error that is odd and linear in the speed, at any load.",
-    confused_with=("pulley-coulomb", "pulley-stribeck"),
+    confused_with=("load-viscous", "pulley-coulomb", "pulley-stribeck"),
     told_apart="A ladder of speeds in both directions.",
     needs=("pulley", "load"),
     order=1,

@@ -71,6 +71,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "the cable on the drum keeps the strain of its winding",
     ),
     "encoder-slip": ("slip of the drum's encoder", "the drum slipped against its encoder"),
+    "load-viscous": ("viscous friction of the load", "the load has viscous friction in its guide"),
     "load-coulomb": ("Coulomb friction of the load", "the load has Coulomb friction in its guide"),
     "load-friction-at-place": (
         "friction of the load at one position",
