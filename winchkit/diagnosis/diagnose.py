@@ -25,6 +25,7 @@ from winchkit.diagnosis.residuals.attribution import (
     attributions,
     harmonics,
 )
+from winchkit.diagnosis.residuals.common_force import common_force
 from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
 from winchkit.diagnosis.residuals.unresolved_acceleration import unresolved_acceleration
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, NextRun, OutputFit, Step
@@ -374,6 +375,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     repeat = [NextRun((), advice)] if verdict == "undecided" else []
     lost = sorted(known.refuted - known.deciding) if noise.from_repeats else []
     late = (*unrelated(lost), *unresolved_acceleration(regression, final.residual))
+    if verdict in ("unknown", "partly"):
+        late += common_force(regression, found.initial_model.residual)
     diagnosis = Diagnosis(
         verdict=verdict,
         outputs=outputs,

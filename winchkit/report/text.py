@@ -12,6 +12,7 @@ from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.residuals.common_force import COMMON_FORCE
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset, Step
 from winchkit.effects.card import sparkline
 from winchkit.effects.effect import parameter_name
@@ -419,6 +420,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
     if isinstance(result, Diagnosis) and unrelated_outputs(result):
         told |= {UNRELATED}
+    if isinstance(result, Diagnosis):
+        told |= {COMMON_FORCE}
     most = {} if all_shares else {"most": 1}
     findings = finding_texts([f for f in result.sanity if f.code not in told], **most)
     caveats = [caveat_text(code) for code in result.caveats if code not in told]

@@ -9,6 +9,7 @@ from winchkit.diagnosis.data.sanity import ALARMING, UNRELATED
 from winchkit.diagnosis.design.programmes import ISOLATING
 from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.residuals.common_force import COMMON_FORCE
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
@@ -175,14 +176,8 @@ def remaining_text(diagnosis: Diagnosis) -> str:
 def changes_text(diagnosis: Diagnosis) -> str:
     """What to record or to do so that the result is confirmed, refuted or decided."""
     other, beyond = _CHANGES[diagnosis.data]
-    if wrong_channels(diagnosis):
-        return "Correct the channel by an import, or confirm that it is right."
-    if lost := unrelated_outputs(diagnosis):
-        names = listed([output_name(name) for name in lost])
-        return (
-            f"Check the instrument of the {names}, its wiring and its column in the file: no "
-            "effect of the motion explains what differs between repeats."
-        )
+    if wrong := _instruments_text(diagnosis):
+        return wrong
     whole = any(step.whole for step in reported(diagnosis).steps)
     if whole and diagnosis.verdict != "undecided":
         return "Calibrate the robot first: beside a wrong geometry an effect may imitate it."
@@ -201,6 +196,20 @@ def changes_text(diagnosis: Diagnosis) -> str:
         else f"To explain {rest}: write an effect of your own, or record a run that isolates its "
         "cause."
     )
+
+
+def _instruments_text(diagnosis: Diagnosis) -> str:
+    """What to do where instruments are wrong, or agree with each other and not with the load."""
+    if wrong_channels(diagnosis):
+        return "Correct the channel by an import, or confirm that it is right."
+    if lost := unrelated_outputs(diagnosis):
+        names = listed([output_name(name) for name in lost])
+        return (
+            f"Check the instrument of the {names}, its wiring and its column in the file: no "
+            "effect of the motion explains what differs between repeats."
+        )
+    common = [f.text for f in diagnosis.sanity if f.code == COMMON_FORCE]
+    return f"To explain the rest: {common[0]}." if common else ""
 
 
 def _between(effects: Sequence[str]) -> str:
