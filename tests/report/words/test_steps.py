@@ -8,7 +8,7 @@ from math import radians
 import pytest
 
 from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED, diagnosis_of
-from winchkit.diagnosis.results import Doubt, Estimate, Step
+from winchkit.diagnosis.results import Doubt, Estimate, Place, Step
 from winchkit.report.text import step_lines
 from winchkit.report.words.sentence import headline, sentence
 from winchkit.report.words.steps import (
@@ -224,7 +224,8 @@ def test_a_small_effect_that_explains_more_than_all_that_is_left_is_reported(
     """Friction beside a weight: 0.2 % of the excess, and twice the noise."""
     outputs = {"cable_length": replace(NOISY, heldout_rms_before=before, heldout_rms_after=3e-4)}
     main = replace(FRICTION, certain=True, share=0.97)
-    small = replace(ELASTIC, certain=False, share=0.002)
+    place = (Place("cable", "cable_length", "tension"),)
+    small = replace(ELASTIC, certain=False, share=0.002, place=place)
     assert len(named_only([main, small], outputs)) == count
     text = sentence(diagnosis_of("explained", main, small, outputs=outputs))
     assert ("2 effects are missing" in text) == (count == 0)

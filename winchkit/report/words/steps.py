@@ -88,13 +88,18 @@ def named_only(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> list[
     """Additions that are doubtful and explain less than a hundredth of the excess each, where the
     others explain nine tenths without them.
 
-    One that explains more than all that is left is none: beside a weight, friction is small.
+    One that explains more than all that is left in its outputs is none: beside a weight, friction
+    is small.
     """
     noise = {name: output.noise_rms for name, output in outputs.items()}
     before = excess({name: output.heldout_rms_before for name, output in outputs.items()}, noise)
-    left = sum((outputs[name].heldout_rms_after / n) ** 2 for name, n in noise.items() if n)
-    least = min(_NEGLIGIBLE, left / before) if before else _NEGLIGIBLE
-    small = [s for s in steps if not s.certain and not s.refitted and explained_share(s) < least]
+    left = {name: (outputs[name].heldout_rms_after / n) ** 2 for name, n in noise.items() if n}
+
+    def least(step: Step) -> float:
+        there = sum(left.get(name, 0.0) for name in {place.output for place in step.place})
+        return min(_NEGLIGIBLE, there / before) if before else _NEGLIGIBLE
+
+    small = [s for s in steps if not s.certain and not s.refitted and explained_share(s) < least(s)]
     main = sum(explained_share(step) for step in steps if step not in small)
     return small if main > _MAIN else []
 
