@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import CATALOGUE, Ride, engine_for, term
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
 from winchkit.diagnosis.selection.stepwise import stepwise_selection
 from winchkit.diagnosis.verdict.equivalence import equivalence_set
+from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
+from winchkit.effects.transition import with_transitions
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
 
@@ -121,3 +124,18 @@ def test_a_fixed_hypothesis_keeps_its_values() -> None:
     held = engine.fixed(other, noise)
     assert held.vector == pytest.approx(engine.regression.vector(other))
     assert engine.refit(other, noise).chi_square < held.chi_square
+
+
+def test_a_rival_with_a_friction_turns_around_over_the_same_speed() -> None:
+    """The catalogue's transition, found beside a viscous friction that was still missing, is too
+    large: a capstan is a pulley's Coulomb friction, whichever transition that has."""
+    engine = engine_for([term("pulley-coulomb", friction=0.01)], RIDE)
+    rounded = Catalogue(with_transitions(e, {"m/s": 0.2}) for e in CATALOGUE.of_winches())
+    engine = selection_engine(engine.regression.dataset, rounded)
+    sharp = term("pulley-coulomb", friction=0.01)
+    present, noise = engine.fit_with_noise(
+        engine.initial_model.with_term(sharp, engine.regression.n_runs)
+    )
+    found = equivalence_set(engine, present, noise, engine.n_initial_terms)
+    assert set(found.effects) == {"pulley-coulomb", "pulley-capstan"}
+    assert [t.values["transition"] for t in found.terms] == [0.0, 0.0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from itertools import combinations
 
@@ -15,6 +16,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN
 from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.scores import Score
+from winchkit.effects.transition import TRANSITION, with_transitions
 
 _MARGIN = 0.1
 """Share of the term's explained χ² by which the linear prediction may miss the target."""
@@ -26,7 +28,8 @@ class RivalPlace:
 
     In ``base`` the others compensate for the effect, for instance a creep with a shorter time
     constant for a wrong ratio. A rival fitted from there may end in a local minimum, so that it is
-    also started from the others' values in the present model.
+    also started from the others' values in the present model. A rival with a friction turns around
+    over the same rate as the effect.
     """
 
     def __init__(self, engine: SelectionEngine, present: Fit, noise: BandNoise, index: int) -> None:
@@ -54,6 +57,7 @@ class RivalPlace:
         A fit ends where ``aim``, ``target`` at least, is out of reach. It is abandoned where even
         the larger χ² ``least`` is.
         """
+        rival = self._turning_alike(rival)
         first_trial = self._engine.trial(self.base, rival, self._noise, target=least, aim=aim)
         if first_trial.fit.chi_square < target or not self._others.terms:
             return first_trial
@@ -62,10 +66,21 @@ class RivalPlace:
         limit = target + _MARGIN * (self.base.chi_square - target)
         if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
-        second_trial = self._engine.trial(held, rival_beside, self._noise, target=least, aim=aim)
+        beside = self._turning_alike(rival_beside)
+        second_trial = self._engine.trial(held, beside, self._noise, target=least, aim=aim)
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
         )
+
+    def _turning_alike(self, rival: Score) -> Score:
+        """The rival with the effect's transition, fitted since the catalogue's was found."""
+        known = {
+            p.unit: self.own.values[TRANSITION]
+            for p in self.own.effect.parameters
+            if p.name == TRANSITION
+        }
+        effect = with_transitions(rival.candidate.effect, known)
+        return replace(rival, candidate=replace(rival.candidate, effect=effect))
 
 
 _MOST_TRIALS = 2
