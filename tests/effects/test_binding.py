@@ -66,9 +66,10 @@ def test_every_fault_is_reported_with_its_line() -> None:
         table("pulley-coulomb", friction=0.9),
         table("cell-offset", offset="1 N"),
         table("motor-cogging", amplitude="20 mN m", order=2.5),
+        table("pulley-eccentricity", amplitude="1 mm", pulley=7),
     )
     faults = [str(fault) for fault in check_profile(profile)]
-    assert len(faults) == 6
+    assert len(faults) == 7
     assert all(fault.startswith("winch.toml:7: ") for fault in faults)
     for fault, said in zip(
         faults,
@@ -79,13 +80,14 @@ def test_every_fault_is_reported_with_its_line() -> None:
             "outside 0 to 0.5",
             "twice",
             "'2.5' must be a whole number",
+            "is number 7 of 2 [[pulley]] of the profile",
         ),
         strict=True,
     ):
         assert said in fault
     with pytest.raises(FileError) as caught:
         terms_of(profile)
-    assert len(caught.value.faults) == 6
+    assert len(caught.value.faults) == 7
 
 
 def test_stages_act_in_the_order_of_the_physics_whatever_the_order_in_the_file() -> None:

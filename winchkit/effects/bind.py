@@ -54,6 +54,10 @@ def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list
             faults.append(Fault(message, table.path, table.line, f"effect {table.id}"))
         values, wrong = values_of(effect, table)
         faults.extend(wrong)
+        pulleys = getattr(profile, "pulley", ())
+        if values.get("pulley", 0) > len(pulleys):
+            message = f"is number {values['pulley']:g} of {len(pulleys)} [[pulley]] of the profile"
+            faults.append(Fault(message, table.path, table.line, f"effect {effect.id}.pulley"))
         terms.append(Term(effect, values))
     return terms, faults
 
