@@ -72,7 +72,7 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     if shipped.is_file():
         return shipped
     if Path(name).exists() and (special := file_kind(Path(name).stat().st_mode)):
-        raise FileError(f"{name}: is {special}, not a regular file")
+        raise FileError(f"{name}: is {special} and no {_SINGULAR[kind]}; name a file")
     known = [own for own in names(kind) if not own.startswith("programme-")]
     listed = f" ({', '.join(known)})" if known else ""
     other = next((_SINGULAR[each] for each in _SINGULAR if name in names(each)), None)

@@ -12,7 +12,7 @@ from pathlib import Path
 from winchkit.errors import Fault, FileError
 
 _KINDS = {
-    stat.S_IFDIR: "a directory",
+    stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a FIFO",
     stat.S_IFSOCK: "a socket",
     stat.S_IFCHR: "a character device",
@@ -65,7 +65,7 @@ def read_whole(
     except FileNotFoundError:
         raise error(Fault("there is no such file", str(path))) from None
     except IsADirectoryError:
-        raise error(Fault(f"is a directory, not a {what}", str(path))) from None
+        raise error(Fault(f"is a folder; name a {what} in it", str(path))) from None
     except OSError as reason:
         raise error(Fault(f"cannot be read: {reason.strerror}", str(path))) from None
     except ValueError as reason:

@@ -115,15 +115,15 @@ def parse(text: object, dimension: str) -> float:
     if isinstance(text, int | float) and not isinstance(text, bool):
         if is_bare(dimension):
             return float(text)
-        si = next(iter(UNITS[dimension]))
-        raise UsageError(f'{text} has no unit; write {article(dimension)} as "{text} {si}"')
+        raise UsageError(f'{text} has no unit; write "{text} UNIT" ({_written(dimension)})')
     with_unit = "" if is_bare(dimension) else " with its unit"
     if not isinstance(text, str):
         raise UsageError(f"expected {article(dimension)}{with_unit}, not {type(text).__name__}")
     found = number_and_unit(text)
-    if found is None or found[1].startswith(","):
+    if found is None or found[1].startswith((",", ":")):
         is_comma = "," in text and "." not in text
         hint = f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
+        hint = "; write a ratio as one number, such as 20" if ":" in text else hint
         raise UsageError(f"'{text}' is not a number{with_unit}{hint}")
     value, unit = found
     if not unit and not is_bare(dimension):

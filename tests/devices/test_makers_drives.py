@@ -109,7 +109,7 @@ def test_a_drive_moves_and_notices_a_dead_host(tmp_path: Path, name: str, way: s
     text = bench_text(rig.channel, device=str(home))
     code, output = checked(rig.write_bench(text))
     assert code == 0, output
-    assert f"winch A: loss of the host by {way}" in output
+    assert f"winch A: if the computer falls silent, the drive notices it by {way}" in output
     moves(rig, text, stopped)
 
 
@@ -136,7 +136,7 @@ def test_a_drive_that_notices_nothing_moves_with_hardware_that_stops_it(tmp_path
     named = text.replace("brake = true\n", f"brake = true\n{HARDWARE}")
     code, output = checked(rig.write_bench(named))
     assert code == 0, output
-    assert "winch A: loss of the host by hardware" in output
+    assert "winch A: if the computer falls silent, hardware stops the winch" in output
     moves(rig, named)
 
 

@@ -61,7 +61,7 @@ def test_every_fault_in_one_go(file: Path) -> None:
     ]
     said = {key: message for _, key, message in faults}
     assert said["drum.kind"].endswith("did you mean 'grooved'?")
-    assert '"60 m"' in said["drum.winding_radius"]
+    assert '"60 UNIT" (use one of m, mm' in said["drum.winding_radius"]
     assert said["pulley[2].rap"] == "unknown key; did you mean 'wrap'?"
     assert said["pulley[2].radius"] == "'-40 mm' must be above 0 m"
 

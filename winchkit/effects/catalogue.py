@@ -78,7 +78,7 @@ class Catalogue:
         if found is None:
             raise UsageError(
                 f"no effect '{effect_id}'{suggest(effect_id, [*self._by_id, *EMPIRICAL])}"
-                " ('winchkit effects' lists them)"
+                " ('winchkit effects' lists them, 'winchkit effects WORD' searches)"
             )
         return found
 

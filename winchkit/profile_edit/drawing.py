@@ -124,7 +124,7 @@ FIELDS: tuple[Field, ...] = (
     ),
     Field(
         "guide.screw_lead",
-        "way of the cable guide per turn of its screw",
+        "travel of the cable guide per turn of its screw",
         "5 mm",
         "no cable guide",
     ),
@@ -146,7 +146,8 @@ FIELDS: tuple[Field, ...] = (
         "reference.cable_length",
         "free cable where the motor angle is zero",
         "4 m",
-        "an offset of the length is fitted; a move to a length is not possible",
+        "an offset of the length is fitted; a diagnosis mistakes a part of an elastic cable for a "
+        "compliant frame; a move to a length is not possible",
     ),
     Field(
         "reference.wound_turns",

@@ -16,6 +16,8 @@ _FAILING = 3
 """Outputs that the short text says where they fail."""
 _BIASED = 0.1
 """Share of the mean square of an error from which its mean is said."""
+_SMALL = 0.1
+"""Share of the variance up to which a trend is not said beside an order within a turn."""
 _LENGTHS = ("cable_length", "platform_position")
 
 
@@ -46,7 +48,7 @@ def short_rows(comparison: Comparison) -> list[list[str]]:
 
 def failing(comparison: Comparison) -> list[str]:
     """At most three outputs above their noise: ``tension: 80 % follows the load; mean +3.9 N; up to
-    +4.2 N at 3 m, 196 N``.
+    +4.2 N at free length 3 m, load 196 N``. A small share beside a clear order is left out.
     """
     drawn = {one.output: one for one in reversed(comparison.maps)}
     lines = []
@@ -55,15 +57,18 @@ def failing(comparison: Comparison) -> list[str]:
         if at_noise(error):
             continue
         scale = scale_for(3 * error.rms, error.unit)
-        shares = [
-            *(f"{percent(share)} follows the {variable_name(v)}" for v, share in error.follows[:1]),
-            *(f"{percent(s)} has {often_per_turn(a, order)}" for a, order, s in _clear(error)),
+        orders = [f"{percent(s)} has {often_per_turn(a, order)}" for a, order, s in _clear(error)]
+        trends = [
+            f"{percent(share)} follows the {variable_name(v)}"
+            for v, share in error.follows[:1]
+            if share > _SMALL or not orders
         ]
+        shares = trends + orders
         parts = [", ".join(shares) or "no measured variable explains it"]
         if error.bias**2 > _BIASED * error.rms**2:
             parts.append(f"mean {signed(error.bias, scale)}")
         if name in drawn:
-            parts.append(largest_text(drawn[name], scale))
+            parts.append(largest_text(drawn[name], scale, named=True))
         lines.append(f"{output_name(name)}: {'; '.join(parts)}")
     return lines[:_FAILING]
 

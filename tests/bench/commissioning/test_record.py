@@ -113,7 +113,7 @@ def test_an_item_that_was_not_confirmed_is_named(spec: BenchSpec, item: str) -> 
 def test_a_drive_that_was_never_seen_to_stop_is_named(spec: BenchSpec) -> None:
     rewrite(spec, "winch", "A", "host_loss", "stopped_after", value=None)
     (item,) = stale_items(spec)
-    assert "was not seen to stop when the host fell silent" in item
+    assert "was not seen to stop when the computer fell silent" in item
 
 
 def test_another_mechanism_than_the_one_that_was_tried_is_named(spec: BenchSpec) -> None:

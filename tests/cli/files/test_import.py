@@ -244,7 +244,7 @@ def test_faults_of_all_files_are_reported_at_once(tmp_path: Path) -> None:
     good = log(tmp_path / "log.csv")
     result = command(good, tmp_path / "none.csv", tmp_path, "-o", tmp_path / "runs", code=3)
     assert "none.csv: there is no such file" in result.stderr
-    assert "directory" in result.stderr
+    assert "folder" in result.stderr
 
 
 def test_a_file_that_a_mapping_does_not_fit_is_refused(tmp_path: Path) -> None:

@@ -89,7 +89,16 @@ def test_a_fleet_without_changes_has_none() -> None:
     known = []
     for winch in "ABCDEF":
         known += estimates(winch, random.normal(0.01, 1e-4, 10).tolist(), 1e-4)
-    assert history_text(fleet_history(known)).startswith("No change over time")
+    assert history_text(fleet_history(known)).startswith("No change over time, and no winch")
+
+
+def test_what_too_few_winches_or_sessions_leave_open_is_not_denied() -> None:
+    values = [0.01, 0.011, 0.0105, 0.0102, 0.0107]
+    few = [one for winch in "ABC" for one in estimates(winch, values, 1e-4)]
+    said = history_text(fleet_history(few))
+    assert said.startswith("No change over time. Not tested: a winch that differs")
+    once = [one for winch in "AB" for one in estimates(winch, values[:1], 1e-4)]
+    assert history_text(fleet_history(once)).startswith("Nothing was tested: a change over time")
 
 
 def run(*arguments: object, code: int = 0) -> Result:

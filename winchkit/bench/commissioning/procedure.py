@@ -231,13 +231,14 @@ class _Steps:
         seen = trials.host_loss(self._name, speed)
         if not seen.stopped:
             raise NotPermitted(
-                f"winch {self._name}: the host fell silent with the drive enabled {where}, and "
-                f"after {seen.after:.2f} s the drive was still {seen.state}; it would go on moving "
-                "when the host dies. Nothing was recorded"
+                f"winch {self._name}: the computer fell silent with the drive enabled {where}, "
+                f"and after {seen.after:.2f} s the drive was still {seen.state}; it would go on "
+                "moving when the computer fails. Nothing was recorded"
             )
         text = (
-            f"winch {self._name}: the host fell silent with the drive enabled {where}. The drive "
-            f"went to {seen.state} after {seen.after:.3f} s and the cable moved {_mm(seen.travel)}."
+            f"winch {self._name}: the computer fell silent with the drive enabled {where}. The "
+            f"drive went to {seen.state} after {seen.after:.3f} s and the cable moved "
+            f"{_mm(seen.travel)}."
         )
         item = "host loss in motion" if speed else "host loss"
         key = f"{self._name}.{item.replace(' ', '_')}"
@@ -248,8 +249,8 @@ class _Steps:
     def _moving(self, trials: Trials) -> TrialResult | None:
         speed = _slow(self._wiring)
         question = (
-            f"winch {self._name}: try the loss of the host also in motion? 'yes' winds in at "
-            f"{speed:g} m/s for 0.8 s, 'no' leaves it out."
+            f"winch {self._name}: let the computer fall silent also in motion? 'yes' winds in "
+            f"at {speed:g} m/s for 0.8 s, 'no' leaves this test out."
             f"{trials.room(self._name)}"
         )
         answer = self._dialogue.ask(f"{self._name}.try_in_motion", question, YES_OR_NO)

@@ -286,7 +286,7 @@ def _stale_winch(
         if item not in known.items:
             yield f"winch {name}: {item} was not confirmed"
     if known.host_loss.stopped_after is None:
-        yield f"winch {name}: the enabled drive was not seen to stop when the host fell silent"
+        yield f"winch {name}: the enabled drive was not seen to stop when the computer fell silent"
     if drive is None:
         return
     for key in fields(DriveRecord):

@@ -45,8 +45,8 @@ def command(winch: str | None, bench: str) -> None:
         with at_station(spec, client="tare") as station:
             tension = station.tare(name)
     advice = (
-        f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
-        "--device the device's own"
+        f"  `winchkit cell tare {name} --clear -b {bench}` removes this tare; with --device, "
+        "that of the device itself"
     )
     tell(
         {"winch": name, "tension": tension},

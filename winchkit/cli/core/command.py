@@ -72,13 +72,14 @@ class ToolCommand(_WithExamples):
         try:
             rest = super().parse_args(ctx, args)
         except click.MissingParameter as error:
-            if (variable := _shared_variable(error.param)) is None:
+            own, said = error.param, error.format_message().removesuffix(".")
+            if (variable := _shared_variable(own)) is not None:
+                said += f": give its name or file, or set {variable}."
+            elif isinstance(own, click.Option) and own.help and "\n" not in said:
+                said += f" {own.metavar or ''}: {own.help}"
+            else:
                 raise
-            raise click.UsageError(
-                f"{error.format_message().removesuffix('.')}: give its name or file, or set "
-                f"{variable}.",
-                ctx,
-            ) from None
+            raise click.UsageError(said, ctx) from None
         except click.NoSuchOption as error:
             meaning = LETTERS.get(error.option_name.removeprefix("-"))
             if meaning is None:

@@ -57,7 +57,8 @@ def report_of(value: object) -> DriveReport:
     for one in report.host_loss:
         alike.setdefault(one.reaction, []).append(one.way)
     ways = "; ".join(f"{' or '.join(own)}: {reaction}" for reaction, own in alike.items())
-    faults, details = report.faults, [f"loss of the host, by the EDS: {ways or 'no way'}"]
+    silent = f"if the computer falls silent, by the EDS: {ways or 'not noticed'}"
+    faults, details = report.faults, [silent]
     if value.servo is not None:
         try:
             details.append(_units_of(value.servo))
@@ -121,7 +122,9 @@ def _of_bench(spec: BenchSpec) -> DriveReport:
             said = f"winch {name}: guarding needs remote frames, which '{adapter}' does not send"
             faults[Fault(said, spec.path)] = None
         found = next((one.reaction for one in report.host_loss if one.way == way), "")
-        details.append(f"winch {name}: loss of the host by {way}{f': {found}' if found else ''}")
+        noticed = f"{_SILENT} by {way}{f': {found}' if found else ''}"
+        by_hardware = "if the computer falls silent, hardware stops the winch"
+        details.append(f"winch {name}: {by_hardware if way == 'hardware' else noticed}")
         for ref in (winch.cell, winch.load, winch.length, winch.temperature):
             if ref is not None:
                 instrument = load(find("devices", ref.device, spec.path or None))
@@ -265,6 +268,7 @@ def refusals(bench: BenchSpec) -> tuple[str, ...]:
 
 _SHOWN = 12
 """Values of an instrument in one line."""
+_SILENT = "if the computer falls silent, the drive notices it"
 
 
 def describe_eds(path: Path) -> tuple[DriveDescription, tuple[Fault, ...]]:
@@ -293,9 +297,9 @@ def lines_of(drive: DriveDescription) -> Iterator[str]:
     yield f"targets by RPDO: {_carried(drive.targets)}"
     yield f"PDOs: {_pdos('receive', drive.receive)}; {_pdos('transmit', drive.transmit)}"
     for way in drive.host_loss:
-        yield f"loss of the host by {way.way} ({', '.join(way.objects)}): {way.reaction}"
+        yield f"{_SILENT} by {way.way} ({', '.join(way.objects)}): {way.reaction}"
     if not drive.host_loss:
-        yield "loss of the host: no way to notice it"
+        yield "if the computer falls silent, the drive does not notice it"
     for option in drive.options:
         said = "no default" if option.default is None else f"{option.default} ({option.meaning})"
         fixed = "" if option.writable else ", cannot be written"

@@ -174,7 +174,7 @@ def _text(plan: WinchPlan) -> str:
 
     found, pairs = plan.offers, plan.pairs
     if not pairs:
-        rows = [["programme", "minutes", "could show"]]
+        rows = [["programme", "min", "could show"]]
         rows += [[o.kind.name, f"{o.minutes:.1f}", _shown(o, _FEW)] for o in found]
         said = "programmes, and the effects that they could show and these runs could not"
         return "\n".join([said, *hanging(rows)])

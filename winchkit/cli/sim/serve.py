@@ -106,7 +106,7 @@ def command(
             _listen(live, ended, end_with_input=end_with_input)
             while not ended.wait(_CHECK_EVERY):
                 live.check()
-    click.echo(f"ended; {path} leads nowhere any more", err=True)
+    click.echo(f"ended: no bench answers at {path} any more", err=True)
 
 
 def _refuse_to_replace(path: Path) -> None:

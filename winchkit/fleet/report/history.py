@@ -9,7 +9,14 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
-from winchkit.fleet.report.text import beyond_text, change_text, day_text, odd_texts, swap_text
+from winchkit.fleet.report.text import (
+    beyond_text,
+    change_text,
+    day_text,
+    nothing_text,
+    odd_texts,
+    swap_text,
+)
 from winchkit.quantity_text import unbroken
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
 from winchkit.report.html.markup import Markup, element, section, table
@@ -50,6 +57,8 @@ def fleet_history_html(
         f"winch{'es' * (len(winches) > 1)}"
         if changed
         else "No change over time"
+        if history.odd
+        else nothing_text(history)
     )
     beyond = [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     differs = bool(history.odd or beyond or swapped)

@@ -9,11 +9,13 @@ from math import isfinite
 
 import numpy as np
 
+from winchkit.fleet.diagnosis.changes import LEAST_SESSIONS
 from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
-from winchkit.fleet.diagnosis.partial_pooling import partial_pooling
+from winchkit.fleet.diagnosis.partial_pooling import LEAST_WINCHES, partial_pooling
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
 from winchkit.model.stages import RESULT_UNITS
 from winchkit.quantity_text import quantity, scale_for, with_std
+from winchkit.report.words.columns import paragraph
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
 _DO = {
@@ -59,7 +61,7 @@ def history_text(
     lines += [swap_text(swap) for swap in swapped]
     if not lines:
         beside = " in the sessions that were fitted" if left_out else ""
-        lines = [f"No change over time, and no winch that differs from the others{beside}."]
+        lines = paragraph(f"{nothing_text(history, beside)}.")
     tested = sum(len(parameter.winches) for parameter in history.parameters)
     lines += ["", f"{tested} series of estimates; false discovery rate 1 % ({history.procedure})."]
     if history.undetermined:
@@ -67,6 +69,23 @@ def history_text(
     if left_out:
         lines += ["", "left out or cut short:", *(f"  {text}" for text in left_out)]
     return "\n".join(lines)
+
+
+def nothing_text(history: FleetHistory, beside: str = "") -> str:
+    """What was looked for and not found, and what too few sessions or winches leave open; without
+    the last full stop."""
+    winches = [winch for parameter in history.parameters for winch in parameter.winches]
+    changes = any(winch.change is not None for winch in winches)
+    odd = any(isfinite(winch.odd_q_value) for winch in winches)
+    change_takes = f"a change over time takes {LEAST_SESSIONS} sessions of a winch"
+    odd_takes = f"a winch that differs from the others takes {LEAST_WINCHES} winches"
+    if changes and odd:
+        return f"No change over time, and no winch that differs from the others{beside}"
+    if changes:
+        return f"No change over time{beside}. Not tested: {odd_takes}"
+    if odd:
+        return f"No winch differs from the others{beside}. Not tested: {change_takes}"
+    return f"Nothing was tested: {change_takes}, {odd_takes}"
 
 
 def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:

@@ -10,7 +10,7 @@ from winchkit.fleet.diagnosis.history import FleetParameter, WinchHistory
 from winchkit.fleet.library.history import LibraryHistory, library_history
 from winchkit.fleet.library.index import profile_path
 from winchkit.fleet.library.sessions import winch_sessions
-from winchkit.fleet.report.text import change_text, odd_texts
+from winchkit.fleet.report.text import change_text, nothing_text, odd_texts
 from winchkit.fleet.web.runs import Library
 from winchkit.plain_json import significant
 from winchkit.quantity_text import scale_for
@@ -64,6 +64,7 @@ class Fleet:
                 "failures": dict(self._found.failures) | dict(self._found.faults),
                 "changed": len(history.changed),
                 "odd": len(history.odd),
+                "nothing": nothing_text(history),
                 "winches": len({session.winch for session in sessions}),
                 "procedure": history.procedure,
                 "undetermined": history.undetermined,

@@ -22,12 +22,13 @@ def map_text(drawn: ResidualMap, scale: PrintScale) -> str:
     return f"over {names} {percent(drawn.share)}, {largest_text(drawn, scale)}"
 
 
-def largest_text(drawn: ResidualMap, scale: PrintScale) -> str:
-    """``up to +1.2 mm at 3 m, 196 N``."""
+def largest_text(drawn: ResidualMap, scale: PrintScale, *, named: bool = False) -> str:
+    """``up to +1.2 mm at 3 m, 196 N``; ``named`` with the names of the variables."""
     across, up = drawn.largest
     mean = float(drawn.mean[across, up])
     places = [
-        _place(map_reading(name), float(np.mean(edges[at : at + 2])))
+        (f"{variable_name(name)} " if named else "")
+        + _place(map_reading(name), float(np.mean(edges[at : at + 2])))
         for name, edges, at in zip(drawn.over, drawn.edges, (across, up), strict=True)
     ]
     return f"up to {signed(mean, scale)} at {', '.join(places)}"

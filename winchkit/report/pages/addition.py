@@ -118,8 +118,8 @@ def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
         )
     head = ["output", "today", "with it", "noise", "÷ noise", "fitted"]
     caption = (
-        "Held-out error, rms: each group of runs is predicted with values fitted without it. The "
-        "last column is the error of the fitted runs."
+        "Held-out error, rms: measured on runs that the fit had not seen. The last column is the "
+        "error of the fitted runs."
     )
     return table(caption, head, rows)
 

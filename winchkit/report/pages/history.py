@@ -23,8 +23,8 @@ def ladder_html(name: str, rungs: Sequence[HistoryStep]) -> str:
     if not rungs:
         return page(title, (), element("p", "No effect was added or removed."))
     caption = (
-        "Held-out error, rms, after each step: each group of runs is predicted with values fitted "
-        "without it. The vertical mark is the noise at that step; bars of a column have one scale."
+        "Held-out error, rms, after each step: measured on runs that the fit had not seen. The "
+        "vertical mark is the noise at that step; bars of a column have one scale."
     )
     shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
     head = ["step", "meaning", *(OUTPUT_NAMES[o] for o in shown)]

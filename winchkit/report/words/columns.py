@@ -55,5 +55,6 @@ def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
         initial_indent=first,
         subsequent_indent=then,
         break_on_hyphens=False,
+        break_long_words=False,
     )
     return [line.replace("\u00a0", " ") for line in lines]

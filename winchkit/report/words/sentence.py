@@ -225,7 +225,7 @@ def plan_texts(found: WinchPlan) -> list[str]:
     for one, other in found.inseparable:
         texts.append(
             f"{one.effect.id} / {other.effect.id}: no such motion within {at.low:.2f} m to "
-            f"{at.high:.2f} m distinguishes them. What does: "
+            f"{at.high:.2f} m distinguishes them. To decide: "
             f"{told_apart(one.effect, other.effect)}"
         )
     if not texts and not found.pairs and not any(offer.shows for offer in found.offers):

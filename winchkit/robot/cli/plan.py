@@ -103,7 +103,7 @@ def _indistinguishable(plan: PosePlan) -> list[str]:
         if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
             names = f"{first.effect.id} / {second.effect.id}"
             what = told_apart(first.effect, second.effect)
-            lines += paragraph(f"{names}: no such poses distinguish them. What does: {what}")
+            lines += paragraph(f"{names}: no such poses distinguish them. To decide: {what}")
     if plan.best is None and not plan.pairs:
         hidden = ", ".join(term.effect.id for term in plan.hidden)
         lines += paragraph(f"No such poses would show what these did not: {hidden}.")

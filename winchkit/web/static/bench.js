@@ -38,7 +38,7 @@ export async function station(state) {
 export function enter(main) {
   root = main;
   if (wanted) { const parts = wanted; wanted = null; restore(parts); }
-  if (!declared) { fill(root, el("div", { class: "drop" }, el("h1", {}, "Connect a bench"), el("p", { class: "note" }, "A page shows the bench that it was started with. In a terminal:"), el("pre", { tabindex: 0 }, "winchkit serve --bench bench.toml --allow-motion\nwinchkit serve --sim demo-adequate --allow-motion"), el("p", { class: "note" }, "The second one is a simulated bench. Without the last word the page only watches."))); return; }
+  if (!declared) { fill(root, el("div", { class: "drop" }, el("h1", {}, "Connect a bench"), el("p", { class: "note" }, "A page shows the bench that it was started with. In a terminal:"), el("pre", { tabindex: 0 }, "winchkit serve --sim demo-adequate\nwinchkit serve --bench bench.toml --allow-motion"), el("p", { class: "note" }, "The first command starts a simulated bench, which the page may move. The second one opens your own; without its last word the page only watches."))); return; }
   build();
 }
 export function leave() { release(); root = null; if (declared) fill(document.getElementById("stopbar"), stopButton()); }

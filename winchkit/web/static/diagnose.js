@@ -242,7 +242,7 @@ async function drawCard() {
     const host = el("div", { class: "plot" });
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}. To decide: ${card.told_apart}`) : null;
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
-      host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
+      host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), el("span", { class: "note" }, `over ${nameOf(card.signature.label)}`), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
@@ -259,7 +259,7 @@ async function drawPattern() {
   fill(next, el("h2", {}, "What to do next"));
   await drawAnswer(box, () => ask("/api/pattern?number=0"), (found) => {
     const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
-    fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
+    fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), el("span", { class: "note" }, `over ${nameOf(found.label)}`), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
     const { columns } = sorted(found.x, found.residual);
     plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic, names: ["residual"], unit: found.unit,
       traces: [{ name: "mean", x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ name: "law", x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
@@ -281,6 +281,9 @@ const planRun = () => attempt(async () => {
   const { file, text, words, command } = await ask("/api/plan", "{}");
   dialog(`A programme for the next run: ${file}`, el("p", {}, words), el("pre", { tabindex: 0 }, text), el("p", { class: "note" }, "As a command:"), el("pre", { tabindex: 0 }, command));
 });
+
+// "drum angle" of "drum angle [°]".
+const nameOf = (label) => label.replace(/ \[.*$/, "");
 
 // Two sets of points over one x, sorted.
 function mixed(x, y, others, marks) {

@@ -41,7 +41,7 @@ function render() {
   busy();
   if (!fitted) { root.append(start()); return; }
   if (!picked) picked = first(fitted);
-  root.append(el("div", { class: "verdict" }, el("h1", {}, fitted.changed || fitted.odd ? [fitted.changed ? many(fitted.changed, "change") : null, fitted.odd ? `${many(fitted.odd, "winch")} that differ${fitted.odd === 1 ? "s" : ""} from the others` : null].filter(Boolean).join(", ") : "No change over time, and no winch that differs"),
+  root.append(el("div", { class: "verdict" }, el("h1", {}, fitted.changed || fitted.odd ? [fitted.changed ? many(fitted.changed, "change") : null, fitted.odd ? `${many(fitted.odd, "winch")} that differ${fitted.odd === 1 ? "s" : ""} from the others` : null].filter(Boolean).join(", ") : fitted.nothing),
     el("p", {}, `${many(fitted.winches, "winch")}, ${many(fitted.sessions, "session")}, the same effects fitted to all; false discovery rate 1 % (${fitted.procedure}).${fitted.undetermined ? ` ${fitted.undetermined} estimates left out, which their runs leave open.` : ""}`)),
   el("div", { class: "grid" }, el("section", { class: "panel w8", "aria-label": "Fleet" }, fitted.parameters.map(drawGrid), scale()), el("section", { class: "panel w4", id: "series", "aria-label": "Estimates of a winch" })));
   for (const [name, reason] of Object.entries(fitted.failures)) root.append(el("p", { class: "note" }, `${name}: ${reason}`));

@@ -33,7 +33,7 @@ export function consequences(found) {
   const still = found.blocked.filter((one) => one.forbids !== "nothing" && !found.tripped.some((trip) => trip.message === one.message)).map((one) => `${one.message}: forbids ${one.forbids}`);
   const same = found.blocked.filter((one) => one.forbids !== "nothing" && found.tripped.some((trip) => trip.message === one.message)).map((one) => one.forbids);
   const now = el("p", {}, `${stopped} After the reset nothing moves before a new command${same.length ? `; ${[...new Set(same)].join(", ")} stays forbidden until this ends` : ""}.`);
-  return !still.length ? now : el("div", {}, now, el("details", {}, el("summary", {}, `${still.length === 1 ? "A condition still forbids" : `${still.length} conditions still forbid`} motion after the reset`), el("ul", {}, still.map((words) => el("li", {}, words)))));
+  return !still.length ? now : el("div", {}, now, el("details", {}, el("summary", {}, "Still present; a reset alone does not free the winch:"), el("ul", {}, still.map((words) => el("li", {}, words)))));
 }
 
 // Messages that differ by the name of the winch only, as one: "winches A and B: …".
