@@ -96,8 +96,8 @@ def miscounted_turns(regression: Regression, fit: Fit, index: int) -> str | None
     if not growth or not _LEAST_TURNS <= abs(turns := error / growth) <= max(wound, 1.0):
         return None
     return (
-        f"{wound + turns:.3g} instead of {wound:.3g} turns on the drum at the reference change the "
-        "same: count them"
+        f"{wound + turns:.3g} turns on the drum at the reference instead of {wound:.3g} would "
+        "explain the same: count them"
     )
 
 

@@ -17,6 +17,7 @@ from winchkit.diagnosis.data.copies import COPIES
 from winchkit.diagnosis.data.decimation import Decimation
 from winchkit.diagnosis.data.input_denoising import denoised_motions
 from winchkit.diagnosis.data.low_pass import RemovedBand, cut_offs_of
+from winchkit.diagnosis.data.reference_length import with_measured_length
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel
 from winchkit.diagnosis.data.sanity import caveats
@@ -162,6 +163,10 @@ def assemble(
     clocks = [_clock(run) for run in runs]
     signals = [_signals(run, profile, clock) for run, clock in zip(runs, clocks, strict=True)]
     raw = [line.motion(own) for own in signals]
+    profile = with_measured_length(profile, line, runs, raw)
+    if profile is not line.profile:
+        line = Line(profile)
+        raw = [line.motion(own) for own in signals]
     decimation = filtering.decimation
     if decimation is not None:
         raw = [decimation.motion(motion) for motion in raw]

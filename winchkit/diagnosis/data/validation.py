@@ -176,9 +176,9 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
         return _slope(line.predict(line.motion(scaled))["cable_length"], measured)
 
     known = length_words(slope, slope_at)
-    why = f"{known}, or " if known else ""
+    why = f"{known}; or " if known else ""
     message = (
-        f"changes by {slope:.3g} times what profile '{profile.name}' predicts; this is {why}"
+        f"changes by {slope:.3g} times what profile '{profile.name}' predicts. Cause: {why}"
         "another winch, another ratio or another direction: check gearbox.ratio, "
         "gearbox.direction and drum.winding_radius"
     )
