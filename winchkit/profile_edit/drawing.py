@@ -146,8 +146,8 @@ FIELDS: tuple[Field, ...] = (
         "reference.cable_length",
         "free cable where the motor angle is zero",
         "4 m",
-        "an offset of the length is fitted; a diagnosis mistakes a part of an elastic cable for a "
-        "compliant frame; a move to a length is not possible",
+        "runs that measure the length give it; without them how much cable stretches is unknown; "
+        "a move to a length is not possible",
     ),
     Field(
         "reference.wound_turns",

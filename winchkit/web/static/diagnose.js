@@ -406,7 +406,7 @@ function drawData() {
   const items = (list) => list.length ? el("ul", {}, list.map((text) => el("li", {}, text))) : el("p", { class: "note" }, "none");
   fill(box, el("details", { open: ["unknown", "partly", "undecided"].includes(d.verdict) }, el("summary", {}, "Data, patterns of the residual, and what would change this result"), el("div", { class: "facts" },
     el("div", {}, el("h2", {}, "Patterns of the residual"), items(d.unexplained)),
-    el("div", {}, el("h2", {}, "Findings on the runs"), items(d.sanity.map((f) => `${f.run}: ${f.channel}: ${f.text}`))),
+    el("div", {}, el("h2", {}, "Findings on the runs"), items(d.sanity.map((f) => [f.run, f.channel, f.text].filter(Boolean).join(": ")))),
     el("div", {}, el("h2", {}, "Notes"), items([...d.notes, d.changes])))));
 }
 
