@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.model.derivatives import SamplingTimes, with_turning_points
+from winchkit.model.derivatives import SamplingTimes, lateness, with_turning_points
 
 
 @given(st.floats(0.02, 0.97), st.floats(0.5, 40.0))
@@ -49,3 +49,20 @@ def test_differences_are_numpys_gradient_on_uneven_samples(count: int, seed: int
     random = np.random.default_rng(seed)
     time, x = np.cumsum(random.uniform(0.01, 0.03, count)), random.standard_normal(count)
     assert SamplingTimes(time).differences(x) == pytest.approx(np.gradient(x, time), rel=1e-12)
+
+
+@pytest.mark.parametrize("delay", [0.0, 4e-3, 0.02])
+def test_a_velocity_behind_a_filter_is_late_by_its_time_constant(delay: float) -> None:
+    """A low-pass of first order follows a slow sine by its time constant, at whatever stamps."""
+    random = np.random.default_rng(4)
+    time = np.round(np.arange(0.0, 8.0, 2e-3) + 2e-4 * random.standard_normal(4000), 3)
+    time = np.unique(time)
+    angle, omega = 40.0 * np.sin(2.0 * time), 2.0
+    # Steady state of a first-order low-pass: amplitude 1/√(1 + (ωτ)²), phase −atan(ωτ).
+    phase = np.arctan(omega * delay)
+    velocity = 80.0 * np.cos(phase) * np.cos(omega * time - phase)
+    velocity = velocity + 0.05 * random.standard_normal(len(time))
+    late, std = lateness(velocity, angle + 1e-3 * random.standard_normal(len(time)), time)
+    assert abs(late - phase / omega) < 4 * std + 0.02 * delay
+    times = SamplingTimes(time, angle, velocity)
+    assert times.rate[100:-100] == pytest.approx(80.0 * np.cos(omega * time)[100:-100], abs=0.3)

@@ -74,6 +74,19 @@ def is_smoother(measured: Array, differences: Array) -> bool:
     return float(np.std(np.diff(measured, 2))) < _CALMER * float(np.std(np.diff(differences, 2)))
 
 
+def lateness(velocity: Array, angle: Array, time: Array) -> tuple[float, float]:
+    """Time by which a reported velocity (n,) follows the angle's differences, as behind a filter,
+    and its standard deviation, s; NaN where it does not change."""
+    change = np.gradient(velocity, time)
+    size = float(change @ change)
+    if not size > 0.0:
+        return float("nan"), float("nan")
+    missing = np.gradient(angle, time) - velocity
+    late = float(change @ missing) / size
+    left = missing - late * change
+    return late, float(np.sqrt(left @ left / len(left) / size))
+
+
 @dataclass(frozen=True)
 class SamplingTimes:
     """Sampling times, and derivatives of signals sampled at them: differences where the samples are
@@ -97,11 +110,16 @@ class SamplingTimes:
 
     @cached_property
     def measured_rate(self) -> Array | None:
-        """The reported rate where it has less noise than differences of the angle; else None."""
+        """The reported rate where it has less noise than differences of the angle, without its
+        significant lateness; else None."""
         if self.angle is None or self.velocity is None:
             return None
-        smoother = is_smoother(self.velocity, np.gradient(self.angle, self.time))
-        return self.velocity if smoother else None
+        late, std = lateness(self.velocity, self.angle, self.time)
+        velocity = self.velocity
+        if abs(late) > _SIGNIFICANT * std:
+            velocity = np.interp(self.time + late, self.time, velocity)
+        smoother = is_smoother(velocity, np.gradient(self.angle, self.time))
+        return velocity if smoother else None
 
     @property
     def _moved(self) -> Array | None:

@@ -2,14 +2,18 @@
 
 An addition is accepted where its held-out χ² decreases block by block (Wilcoxon signed-rank test)
 or in every group of programme and load by more than the penalty, and where it decreases some
-held-out error by at least 2 %. An error that it raises by more has to be outweighed ten times.
+held-out error by at least 2 %. An error that it raises by more has to be outweighed ten times; one
+that was noise stays noise.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from winchkit.diagnosis.regression.cross_validation import (
+    AT_NOISE,
     CERTAIN,
     held_out,
     held_out_rms,
@@ -99,10 +103,25 @@ def is_accepted(
         return False
     if max(ratios) < _NO_WORSE:
         return True
+    if _passes_noise(was, now, noise):
+        return False
     # What an effect raises that takes another's place belongs to that one.
     falls = [(was[o] ** 2 - now[o] ** 2) / noise.rms[o] ** 2 for o in was if noise.rms[o]]
     rise = -sum(fall for fall in falls if fall < 0.0)
     return {*present.labels} <= {*larger.labels} and rise < CERTAIN * (sum(falls) + rise)
+
+
+def spoils(engine: SelectionEngine, present: Fit, other: Fit, noise: BandNoise) -> bool:
+    """Whether a held-out error that is noise with one model is above it with another."""
+    folds = engine.folds(other, noise)
+    was, now = (
+        held_out_rms(engine.regression, fitted, noise, folds) for fitted in (present, other)
+    )
+    return _passes_noise(was, now, noise)
+
+
+def _passes_noise(was: Mapping[str, float], now: Mapping[str, float], noise: BandNoise) -> bool:
+    return any(was[output] <= AT_NOISE * noise.rms[output] < now[output] for output in was)
 
 
 def _added(present: Fit, larger: Fit) -> int:

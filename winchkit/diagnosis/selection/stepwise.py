@@ -24,7 +24,7 @@ from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import BandNoise
-from winchkit.diagnosis.selection.acceptance import best_accepted, is_accepted
+from winchkit.diagnosis.selection.acceptance import best_accepted, is_accepted, spoils
 from winchkit.diagnosis.selection.engine import FittedCandidate, SelectionEngine
 from winchkit.diagnosis.selection.exchange import cancels, pair_exchange
 from winchkit.diagnosis.selection.scores import Score, null_maxima
@@ -285,7 +285,9 @@ def _exchange_and_eliminate(
     for _ in range(_RECONSIDERED):
         before = present.labels
         present = _backward_elimination(engine, present, noise)
-        present = pair_exchange(engine, present, noise, 2)
+        exchanged = pair_exchange(engine, present, noise, 2)
+        if exchanged is not present and not spoils(engine, present, exchanged, noise):
+            present = exchanged
         present = _backward_elimination(engine, present, noise)
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break

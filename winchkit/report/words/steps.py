@@ -46,7 +46,8 @@ _D = TypeVar("_D", bound=Diagnosis)
 
 def reported_steps(diagnosis: Diagnosis) -> list[int]:
     """Indices of the steps that are reported, what explains most first; robots' without a share
-    before. Additions are in the order in which the model grows.
+    before. Additions are in the order in which the model grows; one whose values are not determined
+    ranks by what the others do not explain without it.
 
     A refitted effect of the profile that explains less than a hundredth, and whose values agree
     with those of the file, is left out unless it alone makes the verdict.
@@ -56,7 +57,8 @@ def reported_steps(diagnosis: Diagnosis) -> list[int]:
     for step in steps:
         if isfinite(step.explains):
             least = min(least, step.explains)
-            ranks.append(least)
+            loose = any(doubt.code == "undetermined" for doubt in step.doubts)
+            ranks.append(min(least, step.share) if loose else least)
         else:
             ranks.append(step.share if isfinite(step.share) else inf)
     ranked = sorted(range(len(steps)), key=lambda i: -ranks[i])
@@ -73,6 +75,12 @@ def reported(diagnosis: _D) -> _D:
 def explained_share(step: Step) -> float:
     """Share of the excess that a step explains beside those before it, or else beside all."""
     return step.explains if isfinite(step.explains) else step.share
+
+
+def _most_explained(step: Step) -> float:
+    """The larger of the shares beside those before it and beside all: the first of two frictions
+    imitates the second, which it does not replace."""
+    return max(explained_share(step), step.share if isfinite(step.share) else 0.0)
 
 
 def _is_negligible(step: Step) -> bool:

@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.model.derivatives import lateness
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.factors import Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
@@ -16,6 +18,11 @@ from winchkit.runs.sanity.local_noise import local_noise
 INCONSISTENT = "inconsistent-velocity"
 """Code of the finding on a velocity that is not the derivative of the motor angle."""
 
+LATE = "late-velocity"
+"""Code of the finding on a velocity behind a filter."""
+
+_LATE = 0.5
+"""Lateness in sampling intervals from which it is reported; rule of thumb."""
 _RANGE = 0.8, 1.25
 """Slopes that are no wrong unit: a velocity that its drive has filtered or estimated."""
 _SIGMAS = 3.0
@@ -70,6 +77,19 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
         return
     std = float(np.sqrt(left @ left / (len(turned) - 1) / square))
     yield from _judged(run, name, Slope(slope, std))
+    if _RANGE[0] < slope < _RANGE[1]:
+        yield from _late(run, name, run[angle])
+
+
+def _late(run: Run, name: str, angle: Array) -> Iterator[Finding]:
+    known = np.isfinite(run[name]) & np.isfinite(angle)
+    late, std = lateness(run[name][known], angle[known], run.time[known])
+    if late > max(_SIGMAS * std, _LATE * run.interval):
+        text = (
+            f"it is {quantity(late, 's')} late against the motor angle, as behind a filter; where "
+            "it is used it is shifted back"
+        )
+        yield Finding(LATE, run.name, name, late, text)
 
 
 def _noise(velocity: Array, step: float, rows: float, angle: Array) -> float | None:
