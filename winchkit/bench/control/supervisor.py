@@ -45,9 +45,7 @@ class Supervisor:
     """The conditions on all winches of a bench, and the latch."""
 
     def __init__(
-        self,
-        winches: Mapping[str, Supervised],
-        conditions: Sequence[Condition] = CONDITIONS,
+        self, winches: Mapping[str, Supervised], conditions: Sequence[Condition] = CONDITIONS
     ) -> None:
         """Take the bounds of each winch, and the table of conditions."""
         self.tripped: tuple[Trip, ...] = ()

@@ -149,9 +149,7 @@ def has_other_law(step: Step) -> bool:
 
 
 def step_text(
-    step: Step,
-    outputs: Mapping[str, OutputFit] | None = None,
-    fall: ErrorFall | None = None,
+    step: Step, outputs: Mapping[str, OutputFit] | None = None, fall: ErrorFall | None = None
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
