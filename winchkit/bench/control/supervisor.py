@@ -149,7 +149,6 @@ def _debounced(
 
 
 def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _TestedConditions]:
-    """The conditions that are tested in each case."""
     applying = [row for row in conditions if _applies(row, own)]
     found = {}
     for cell, moving, disabled, follows in product((False, True), repeat=4):

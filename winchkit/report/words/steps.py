@@ -201,7 +201,6 @@ def _alternatives(step: Step, data: str) -> list[str]:
 
 
 def _titled_values(step: Step) -> str:
-    """Title with the values of the effects."""
     if step.whole:
         return _WHOLE
     if step.refitted:
