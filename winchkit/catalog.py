@@ -12,11 +12,7 @@ from winchkit.regular_file import file_kind
 
 Kind = Literal["devices", "profiles", "sim"]
 
-_SINGULAR: dict[Kind, str] = {
-    "devices": "device",
-    "profiles": "profile",
-    "sim": "simulated bench",
-}
+_SINGULAR: dict[Kind, str] = {"devices": "device", "profiles": "profile", "sim": "simulated bench"}
 
 
 def folder(kind: Kind) -> Path:

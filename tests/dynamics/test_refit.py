@@ -29,12 +29,18 @@ INERTIA, COULOMB, VISCOUS = 2e-3, 0.05, 4e-3
 TRUE = {"inertia": INERTIA, "torque": COULOMB, "viscosity": VISCOUS}
 
 
-def recorded(seed: int, stops: bool = False, noise: float = 1e-3, torque_noise: float = 0.0) -> Run:
+def recorded(
+    seed: int,
+    stops: bool = False,
+    noise: float = 1e-3,
+    torque_noise: float = 0.0,
+    seconds: float = 6.0,
+) -> Run:
     """J ω' + c + b ω of ω = 6 + 5 sin 2πt/3, never at rest, or of 5 sin 2πt/3 with its sign.
 
     At a reversal the torque steps, which a sample of 5 ms rounds.
     """
-    time = np.arange(0.0, 12.0, 0.005 if stops else 0.01)
+    time = np.arange(0.0, seconds, 0.005 if stops else 0.01)
     bias = 0.0 if stops else 6.0
     turned = 2 * np.pi / 3
     speed = bias + 5 * np.sin(turned * time)
@@ -178,7 +184,7 @@ def test_values_that_simulate_worse_are_not_written(
 
 
 def test_missing_torque_at_the_ends_is_cut_and_a_long_gap_is_named(tmp_path: Path) -> None:
-    profile, run = read_profile(axis(tmp_path, 1.0)), recorded(1)
+    profile, run = read_profile(axis(tmp_path, 1.0)), recorded(1, seconds=12.0)
 
     def without(*rows: slice) -> Run:
         torque = run["motor_torque"].copy()

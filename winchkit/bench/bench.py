@@ -17,11 +17,7 @@ from winchkit.bench.control.realtime import Request
 from winchkit.bench.control.snapshot import Direction, Trip
 from winchkit.bench.drives.set_up_progress import Tell, to_stderr
 from winchkit.bench.homing import homing
-from winchkit.bench.lifecycle import (
-    await_cycles,
-    await_rest,
-    reset,
-)
+from winchkit.bench.lifecycle import await_cycles, await_rest, reset
 from winchkit.bench.ownership import Ownership, unless_stopped
 from winchkit.bench.remote.commander import Commanders, LifeSigns, NotCommander, NotReleased
 from winchkit.bench.remote.handover import own
@@ -29,13 +25,7 @@ from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.robot import no_robot
 from winchkit.bench.winch import Winch
 from winchkit.drivers.clock import Clock
-from winchkit.errors import (
-    ConnectionLost,
-    DriveFault,
-    LimitTripped,
-    MotionError,
-    NotPermitted,
-)
+from winchkit.errors import ConnectionLost, DriveFault, LimitTripped, MotionError, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:

@@ -109,10 +109,7 @@ class _Main(LazyGroup):
         "winchkit sim record demo-elastic-rope programme-demo",
         "winchkit diagnose demo-*.csv -p bench-spiral",
     ),
-    context_settings={
-        "auto_envvar_prefix": "WINCHKIT",
-        "help_option_names": ["-h", "--help"],
-    },
+    context_settings={"auto_envvar_prefix": "WINCHKIT", "help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="winchkit")
 def main() -> None:

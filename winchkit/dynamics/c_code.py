@@ -12,13 +12,7 @@ from math import isinf, isnan
 from textwrap import indent
 
 from winchkit.dynamics.expression import Expression, Operation, derivative, ordered, statements
-from winchkit.dynamics.step import (
-    BEFORE,
-    OUTPUTS,
-    inputs_of,
-    outputs_of,
-    step_of,
-)
+from winchkit.dynamics.step import BEFORE, OUTPUTS, inputs_of, outputs_of, step_of
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile

@@ -66,9 +66,7 @@ def smoothed(run: Run, profile: WinchProfile) -> SamplingTimes:
     """Motion of the motor of a run as the model smooths it."""
     velocity = run.channels.get("motor_velocity")
     signals = Signals(
-        run.time,
-        run["motor_angle"],
-        motor_velocity=None if velocity is None else velocity.values,
+        run.time, run["motor_angle"], motor_velocity=None if velocity is None else velocity.values
     )
     return Line(profile).motion(signals).clock
 

@@ -14,13 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.dynamics.expression import (
-    OPERATIONS,
-    Expression,
-    apply,
-    number,
-    rate,
-)
+from winchkit.dynamics.expression import OPERATIONS, Expression, apply, number, rate
 
 _SAME_AS = {"true_divide": "divide", "float_power": "power", "bitwise_and": "logical_and",
             "bitwise_or": "logical_or", "fabs": "absolute", "fmax": "maximum"}  # fmt: skip

@@ -222,10 +222,7 @@ def _drawing(effect: Effect) -> list[str]:
     if effect.of_robots:
         text = f"Signature over {len(drawn.time)} poses of the standard robot, on line 1, with"
         over = wrap(f"{text} {usual}", _COLUMNS)
-    lines = [
-        *over,
-        f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length",
-    ]
+    lines = [*over, f"  {'moves':<13}{sparkline(drawn.cable_length)}  cable_length"]
     for name, change in drawn.changes.items():
         low, high = float(np.nanmin(change)), float(np.nanmax(change))
         lines.append(

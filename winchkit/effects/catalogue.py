@@ -136,13 +136,11 @@ def _of_wings() -> tuple[Effect, ...]:
 
 
 def _in_package(name: str) -> Iterator[Effect]:
-    """The effects of every module of a package."""
     for module in iter_modules(import_module(name).__path__):
         yield from _effects_of(import_module(f"{name}.{module.name}"))
 
 
 def _effects_of(module: object) -> list[Effect]:
-    """The module-level effects of a module."""
     return [value for value in vars(module).values() if isinstance(value, Effect)]
 
 

@@ -56,10 +56,7 @@ def single_orders(
     for index in range(len(term.effect.parameters) // len(single.parameters)):
         names = {p.name: _numbered(p.name, index) for p in single.parameters}
         values = {name: term.values[own] for name, own in names.items()}
-        yield (
-            Term(single, values),
-            {name: std[own] for name, own in names.items() if own in std},
-        )
+        yield (Term(single, values), {name: std[own] for name, own in names.items() if own in std})
 
 
 def orders_of(term: Term) -> tuple[int, ...]:

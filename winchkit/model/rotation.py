@@ -59,9 +59,7 @@ def angles_of(rotation: ArrayLike) -> Array:
     upright = flat < 1e-12
     roll = np.where(upright, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
     yaw = np.where(
-        upright,
-        np.arctan2(-r[..., 0, 1], r[..., 1, 1]),
-        np.arctan2(r[..., 1, 0], r[..., 0, 0]),
+        upright, np.arctan2(-r[..., 0, 1], r[..., 1, 1]), np.arctan2(r[..., 1, 0], r[..., 0, 0])
     )
     return np.stack([roll, pitch, yaw], axis=-1)
 

@@ -98,7 +98,6 @@ def undo(source: str | Path, out: str | Path, *, replace: bool = False) -> str:
 
 
 def _replace(document: Any, effects: Any) -> None:
-    """Replace the effects."""
     there = effect_tables(document)
     while len(there):
         del there[len(there) - 1]

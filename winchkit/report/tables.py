@@ -9,19 +9,8 @@ from math import degrees, isfinite
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect, parameter_name
-from winchkit.quantity_text import (
-    PrintScale,
-    grouped,
-    quantity,
-    significant,
-    unbroken,
-)
-from winchkit.report.detectability import (
-    has_typical_sizes,
-    untestable,
-    useful_candidates,
-    visible,
-)
+from winchkit.quantity_text import PrintScale, grouped, quantity, significant, unbroken
+from winchkit.report.detectability import has_typical_sizes, untestable, useful_candidates, visible
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import noise_text, worst_outputs
@@ -86,9 +75,7 @@ def steps(diagnosis: Diagnosis, falls: Sequence[ErrorFall] = ()) -> Markup:
     return element("ol", *items, class_="found") if items else Markup("")
 
 
-def named(
-    found: Iterable[tuple[Effect | None, str, Mapping[str, Estimate]]],
-) -> Markup:
+def named(found: Iterable[tuple[Effect | None, str, Mapping[str, Estimate]]]) -> Markup:
     """Every named effect with its values, formula and source; these are empty if it is unknown."""
     entries: list[Markup] = []
     for effect, effect_id, estimates in found:

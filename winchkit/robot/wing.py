@@ -70,7 +70,7 @@ WING = Wing(
             "hold-platform": (
                 "winchkit.robot.cli.hold_platform",
                 "Hold cable forces and pose of a robot by its cells and tracker.",
-            ),
+            )
         },
     },
     effects=("winchkit.robot.effects.on_robot",),

@@ -61,8 +61,7 @@ class BusSpec(Table):
         Quantity("time", 2e-3, 1.0, why="a drive stops 2.5 heartbeats after the loss of its host"),
     ] = 0.05
     sdo_timeout: Annotated[
-        float,
-        Quantity("time", 0.02, 10.0, why="every request to a dead drive takes as long"),
+        float, Quantity("time", 0.02, 10.0, why="every request to a dead drive takes as long")
     ] = 0.5
     """For the answer to an SDO request: drives answer within some ms, and within some tenths while
     they write a flash memory."""
@@ -77,8 +76,7 @@ class BusSpec(Table):
     # modbus-tcp, and the interface socketcand
     host: str | None = None
     timeout: Annotated[
-        float,
-        Quantity("time", 1e-3, 10.0, why="a later answer is too old for control"),
+        float, Quantity("time", 1e-3, 10.0, why="a later answer is too old for control")
     ] = 0.2
     deviations: tuple[Deviation, ...] = ()
     """Deviations of the only device of a modbus-tcp bus that are accepted: it answers as another
@@ -242,8 +240,7 @@ class BenchSpec(Table):
     cells: Mapping[str, CellWiring] = field(default_factory=dict)
     """The tables ``[winch.NAME]`` of a bench without any profile, drive and limits."""
     cycle: Annotated[
-        float,
-        Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once per cycle"),
+        float, Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once per cycle")
     ] = 0.004
     stop_together: Flag = True
     """Whether a stop of one winch stops all winches. A trip always stops all."""

@@ -285,7 +285,6 @@ def _table(
 
 
 def _with_path(reading: FileReading, tree: dict[str, Any]) -> dict[str, Any]:
-    """A tree with the path of its file."""
     if "path" in tree:
         reading.fault(("path",), "unknown key")
     return {**tree, "path": reading.source.path}

@@ -231,7 +231,4 @@ def _focus(diagnosis: Diagnosis) -> str:
 def _cell(value: float | None, floor: float | None, scale: PrintScale) -> dict[str, Any] | None:
     if value is None or not isfinite(value):
         return None
-    return {
-        "text": significant(value / scale.worth, 3),
-        "ratio": value / floor if floor else None,
-    }
+    return {"text": significant(value / scale.worth, 3), "ratio": value / floor if floor else None}

@@ -230,8 +230,6 @@ class PageState:
             beside = None if known is None else known.diagnosis
             words = refitted(self.said) if self.refitted else verdict(self.answer.diagnosis)
             words = in_units_of(self.answer.engine.regression.dataset.profile, words)
-            out["diagnosis"] = words | {
-                "ladder": ladder(self.answer, self.rungs, beside),
-            }
+            out["diagnosis"] = words | {"ladder": ladder(self.answer, self.rungs, beside)}
             out["commands"] = self.commands()
         return out

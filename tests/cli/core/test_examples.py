@@ -16,7 +16,7 @@ from calibration_cases import EXACT, rows
 from can_commands import served, without_trip
 from command_line import done, examples
 from robot_poses.truth import csv
-from served import Served as ServedCell
+from winchkit import find, read_simbench
 from winchkit.cli.core.command import Example
 
 ROOT = Path(__file__).parents[3]
@@ -163,8 +163,7 @@ def test_examples_of_drives(folder: Path) -> None:
             run(example.line)
 
 
-def test_examples_of_cells(folder: Path) -> None:
-    with ServedCell("laumas-tlb") as cell:
-        cell.bench(folder)
+def test_examples_of_cells_in_simulated_time(folder: Path) -> None:
+    with served(folder, bench=read_simbench(find("sim", "spiral-bench"))):
         for example in chosen(*ON_CELL):
             run(example.line)

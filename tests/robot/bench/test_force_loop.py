@@ -454,4 +454,4 @@ def test_a_stop_before_a_correction_starts_leaves_pose_and_trims(trim: str) -> N
             assert not bench.snapshot.tripped
             assert np.isfinite([one.trim_angle for one in bench.snapshot.winch.values()]).all()
             assert np.isfinite(bench.robot.pose.position).all()
-            clock.sleep(1.0)  # as after the release of a key
+            clock.sleep(0.4)  # as after the release of a key

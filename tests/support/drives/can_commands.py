@@ -14,12 +14,14 @@ import pytest
 
 from bare_winches import bare_winches
 from command_line import done
+from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.paced_clock import PacedClock
 
 CLOCKS = (
     "winchkit.bench.open",
+    "winchkit.bench.remote.cell_session",
     "winchkit.bench.drives.node_access",
     "winchkit.bench.emergency_stop",
 )
@@ -51,13 +53,16 @@ def of_commands(simulated: Callable[..., Any], real: Callable[..., Any]) -> Call
 
 
 @contextmanager
-def served(folder: Path, winches: str = "A", *, paced: bool = False) -> Iterator[Served]:
-    """The shipped spiral bench without its instruments, with as many winches as asked for.
+def served(
+    folder: Path, winches: str = "A", *, paced: bool = False, bench: SimBench | None = None
+) -> Iterator[Served]:
+    """The shipped spiral bench without its instruments, with as many winches as asked for, or
+    another ``bench``.
 
     In simulated time, or ``paced``: for what waits outside the simulated clock, on a socket or for
     the reply to an SDO request.
     """
-    simulated = bare_winches(winches, cycle=0.004 if len(winches) < 3 else 0.02)
+    simulated = bench or bare_winches(winches, cycle=0.004 if len(winches) < 3 else 0.02)
     clock: PacedClock | SimulatedClock
     if paced:
         clock = PacedClock()

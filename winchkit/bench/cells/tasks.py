@@ -9,13 +9,7 @@ from typing import Any
 
 from winchkit.bench.cells.desk import CellDesk, full_name, indicated
 from winchkit.bench.cells.report import about, counters_told, rate_report
-from winchkit.bench.cells.tares import (
-    by_device,
-    clear_tare,
-    host_tare,
-    restore_tares,
-    tares_now,
-)
+from winchkit.bench.cells.tares import by_device, clear_tare, host_tare, restore_tares, tares_now
 from winchkit.drivers.reading import InstrumentReading, Quality
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec

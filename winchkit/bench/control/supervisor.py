@@ -45,9 +45,7 @@ class Supervisor:
     """The conditions on all winches of a bench, and the latch."""
 
     def __init__(
-        self,
-        winches: Mapping[str, Supervised],
-        conditions: Sequence[Condition] = CONDITIONS,
+        self, winches: Mapping[str, Supervised], conditions: Sequence[Condition] = CONDITIONS
     ) -> None:
         """Take the bounds of each winch, and the table of conditions."""
         self.tripped: tuple[Trip, ...] = ()
@@ -151,7 +149,6 @@ def _debounced(
 
 
 def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _TestedConditions]:
-    """The conditions that are tested in each case."""
     applying = [row for row in conditions if _applies(row, own)]
     found = {}
     for cell, moving, disabled, follows in product((False, True), repeat=4):

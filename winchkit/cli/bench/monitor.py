@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=ToolCommand,
-    examples=(
-        "winchkit monitor --for 2s",
-        "winchkit monitor -b bench.toml --for 1s --json",
-    ),
+    examples=("winchkit monitor --for 2s", "winchkit monitor -b bench.toml --for 1s --json"),
 )
 @bench_option
 @quantity_option("--period", of="time", default="0.2 s", help="Time between two pictures.")
@@ -102,9 +99,7 @@ def status_table(status: Mapping[str, Any]) -> Group:
         ]
     )
     table = Table(
-        title=f"cycle {status['cycle']}, overruns {status['overruns']}",
-        padding=0,
-        show_edge=False,
+        title=f"cycle {status['cycle']}, overruns {status['overruns']}", padding=0, show_edge=False
     )
     table.add_column("winch")
     table.add_column("phase", min_width=len("running down"))

@@ -48,10 +48,7 @@ def command(winch: str | None, bench: str) -> None:
         f"  `winchkit cell tare {name} --clear -b {bench}` removes this tare; with --device, "
         "that of the device itself"
     )
-    tell(
-        {"winch": name, "tension": tension},
-        [f"tared: the cell reads {tension:.2f} N", advice],
-    )
+    tell({"winch": name, "tension": tension}, [f"tared: the cell reads {tension:.2f} N", advice])
 
 
 def _tare_alone(bench: str, spec: BenchSpec, winch: str | None) -> tuple[str, float]:

@@ -25,10 +25,7 @@ COMMANDS = {
 @click.group(
     cls=LazyGroup,
     table=COMMANDS,
-    examples=(
-        "winchkit cell info",
-        "winchkit cell diagnose --for 2s",
-    ),
+    examples=("winchkit cell info", "winchkit cell diagnose --for 2s"),
 )
 def command() -> None:
     """Load cells: rate, diagnosis, tare, zero and calibration, each independent of the others.

@@ -216,13 +216,7 @@ def progress_bar() -> Iterator[ProgressCallback]:
     if is_quiet() or not sys.stderr.isatty():
         yield lambda what, share: None
         return
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = (
         BarColumn(),

@@ -51,10 +51,7 @@ def command() -> None:
 
 
 @command.command(
-    examples=(
-        "winchkit config save A -o a.dcf",
-        "winchkit config save A -b bench.toml -o a.json",
-    ),
+    examples=("winchkit config save A -o a.dcf", "winchkit config save A -b bench.toml -o a.json")
 )
 @_who
 @bus_options
@@ -84,10 +81,7 @@ def save(who: str, *, output: Path, replace: bool, **bus: Any) -> None:
 
 
 @command.command(
-    examples=(
-        "winchkit config diff A a.dcf",
-        "winchkit config diff A a.dcf -b bench.toml --json",
-    ),
+    examples=("winchkit config diff A a.dcf", "winchkit config diff A a.dcf -b bench.toml --json")
 )
 @_who
 @_file
@@ -112,7 +106,7 @@ def diff(who: str, file: str, **bus: Any) -> None:
     examples=(
         "winchkit config load A a.dcf",
         "winchkit config load A a.dcf -b bench.toml --dry-run",
-    ),
+    )
 )
 @_who
 @_file
@@ -146,10 +140,7 @@ def load(who: str, file: str, *, dry_run: bool, **bus: Any) -> None:
 
 
 @command.command(
-    examples=(
-        "winchkit config store A -y",
-        "winchkit config store A -b bench.toml --dry-run",
-    ),
+    examples=("winchkit config store A -y", "winchkit config store A -b bench.toml --dry-run")
 )
 @_who
 @bus_options
@@ -165,10 +156,7 @@ def store(who: str, *, yes: bool, dry_run: bool, **bus: Any) -> None:
 
 
 @command.command(
-    examples=(
-        "winchkit config restore A -y",
-        "winchkit config restore A -b bench.toml --dry-run",
-    ),
+    examples=("winchkit config restore A -y", "winchkit config restore A -b bench.toml --dry-run")
 )
 @_who
 @bus_options

@@ -131,7 +131,7 @@ def find(**bus: Any) -> None:
             "winchkit lss identify --vendor 1Ah --product 2 --revision 1 --serial 7",
             "needs a drive that is alone on its bus",
         ),
-    ),
+    )
 )
 @_identity_options
 @bus_options

@@ -11,10 +11,7 @@ _SHELLS = ("bash", "zsh", "fish")
 
 @click.command(
     cls=ToolCommand,
-    examples=(
-        "winchkit completion bash",
-        "winchkit completion fish > winchkit.fish",
-    ),
+    examples=("winchkit completion bash", "winchkit completion fish > winchkit.fish"),
 )
 @click.argument("shell", type=click.Choice(_SHELLS))
 @click.pass_context

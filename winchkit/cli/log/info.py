@@ -24,10 +24,7 @@ _SHOWN = 100
 
 @click.command(
     cls=ToolCommand,
-    examples=(
-        "winchkit log info lift.mcap",
-        "winchkit log info demo-10kg-1.csv --json",
-    ),
+    examples=("winchkit log info lift.mcap", "winchkit log info demo-10kg-1.csv --json"),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUN)
 @json_flag("Print everything as JSON.")

@@ -55,10 +55,7 @@ _SHOW_PERIOD = 0.5
     cls=LazyGroup,
     table=COMMANDS,
     invoke_without_command=True,
-    examples=(
-        "winchkit log -o lift.mcap --for 5s",
-        "winchkit log -b bench.toml --jsonl --for 1s",
-    ),
+    examples=("winchkit log -o lift.mcap --for 5s", "winchkit log -b bench.toml --jsonl --for 1s"),
 )
 @bench_file_option()
 @output_option("Where to: a .csv or .mcap file.", callback=None)

@@ -181,10 +181,7 @@ def ledger(profile: str, html: str | None) -> None:
 
 @click.command(
     cls=ToolCommand,
-    examples=(
-        "winchkit undo -p better.toml",
-        "winchkit undo -p better.toml -o before.toml",
-    ),
+    examples=("winchkit undo -p better.toml", "winchkit undo -p better.toml -o before.toml"),
 )
 @profile_option
 @output_option("Profile to write; else the same file.", "NEW.toml")

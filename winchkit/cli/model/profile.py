@@ -16,14 +16,7 @@ from winchkit.cli.core.options import Decorator, all_of
 from winchkit.cli.core.output import is_json, json_flag
 from winchkit.cli.core.standard_input import may_ask
 from winchkit.errors import UsageError
-from winchkit.profile_edit.drawing import (
-    DRUMS,
-    FIELDS,
-    PULLEY,
-    PULLEY_EXAMPLE,
-    Field,
-    asked,
-)
+from winchkit.profile_edit.drawing import DRUMS, FIELDS, PULLEY, PULLEY_EXAMPLE, Field, asked
 
 _SECTIONS = """\
   spiral, archimedean        grooved           squared

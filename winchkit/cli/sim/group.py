@@ -22,10 +22,7 @@ COMMANDS = {
 @click.group(
     cls=LazyGroup,
     table=COMMANDS,
-    examples=(
-        "winchkit sim list",
-        "winchkit sim record demo-elastic-rope programme-demo",
-    ),
+    examples=("winchkit sim list", "winchkit sim record demo-elastic-rope programme-demo"),
 )
 def command() -> None:
     """Simulated benches: what they hide is known, so a diagnosis can be scored."""

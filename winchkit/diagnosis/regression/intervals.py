@@ -149,8 +149,6 @@ class Spread:
     """Lower end of the 95 % interval."""
     high: Array
     """Upper end of the 95 % interval."""
-    widening: Array
-    """Standard deviation over that of the likelihood; infinite for an undetermined unknown."""
     covariance: Array
     """Covariance of the linearised fit by the likelihood alone, (n_unknowns, n_unknowns)."""
 
@@ -196,12 +194,10 @@ def spread_of(
         np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )
     systematic = HALF_WIDTH * np.sqrt(variance - own)
-    std = np.sqrt(variance)
     return Spread(
-        std,
+        np.sqrt(variance),
         fit.vector - stretch * np.hypot(below, systematic),
         fit.vector + stretch * np.hypot(above, systematic),
-        np.divide(std, likelihood, out=np.full_like(std, np.inf), where=likelihood > 0.0),
         covariance_by_likelihood,
     )
 

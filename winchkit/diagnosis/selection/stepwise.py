@@ -67,12 +67,10 @@ class SelectionResult:
 
     initial_model: Fit
     initial_noise: BandNoise
-    initial_lack_of_fit_test: LackOfFitTest
     lack_of_fit_at_start: bool
     final: Fit
     noise: BandNoise
     lack_of_fit_test: LackOfFitTest
-    lack_of_fit: bool
     scores: tuple[Score, ...]
     tried: tuple[Fit, ...]
     threshold: float
@@ -84,11 +82,10 @@ def stepwise_selection(
     """Select effects for a model as long as it has a lack of fit and candidates are accepted."""
     first = initial_result(engine)
     lacking = _has_lack_of_fit(first.lack_of_fit_test, list(first.scores), first.threshold)
-    start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
+    start = replace(first, lack_of_fit_at_start=lacking)
     known(start)
     initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
     final, noise, tried = _forward_selection(engine, *initial, scores, threshold)
-    lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or lacking
     if lack_of_fit_at_start and not tried:
@@ -98,8 +95,7 @@ def stepwise_selection(
         lack_of_fit_at_start=lack_of_fit_at_start,
         final=final,
         noise=noise,
-        lack_of_fit_test=lack_of_fit_test,
-        lack_of_fit=_has_lack_of_fit(lack_of_fit_test, engine.scores(final, noise), threshold),
+        lack_of_fit_test=engine.lack_of_fit_test(final, noise),
         tried=tried if lack_of_fit_at_start else (),
     )
 
@@ -107,16 +103,13 @@ def stepwise_selection(
 def initial_result(engine: SelectionEngine) -> SelectionResult:
     """Result of the initial model without a search, for data that must not be explained."""
     initial_model, initial_noise = engine.fit_with_noise(engine.initial_model)
-    lack_of_fit_test = engine.lack_of_fit_test(initial_model, initial_noise)
     return SelectionResult(
         initial_model=initial_model,
         initial_noise=initial_noise,
-        initial_lack_of_fit_test=lack_of_fit_test,
         lack_of_fit_at_start=True,
         final=initial_model,
         noise=initial_noise,
-        lack_of_fit_test=lack_of_fit_test,
-        lack_of_fit=True,
+        lack_of_fit_test=engine.lack_of_fit_test(initial_model, initial_noise),
         scores=tuple(engine.scores(initial_model, initial_noise)),
         tried=(),
         threshold=_threshold(engine, initial_model, initial_noise),

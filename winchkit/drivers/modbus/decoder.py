@@ -155,7 +155,6 @@ class RegisterDecoder:
 
 
 def _placed(block: ReadBlock | None, registers: Sequence[int]) -> dict[int, int]:
-    """Registers by address."""
     return {} if block is None else dict(enumerate(registers, block.start))
 
 

@@ -143,11 +143,7 @@ class ModbusLine(SharedLine):
         """Give every instrument the rate that is to be expected."""
         tagged = self._spec.kind == "modbus-tcp" and "transaction-0" not in self._spec.deviations
         for item, rate in zip(self.sensors, self._share.rates, strict=True):
-            item.on_line(
-                1 / rate,
-                wire_times(item.decoder.spec, self._spec),
-                tagged=tagged,
-            )
+            item.on_line(1 / rate, wire_times(item.decoder.spec, self._spec), tagged=tagged)
 
 
 async def send(client: ModbusClient, instrument: Instrument, command: CommandSpec) -> None:

@@ -31,10 +31,7 @@ EFFICIENCY = Parameter(
 GEAR_EFFICIENCY = Effect(
     id="gear-efficiency",
     stage=Stage.GEARBOX,
-    parameters=(
-        EFFICIENCY,
-        CABLE_TRANSITION,
-    ),
+    parameters=(EFFICIENCY, CABLE_TRANSITION),
     apply=_gear_efficiency,
     outputs=("motor_torque",),
     variable="direction",

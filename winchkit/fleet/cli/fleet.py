@@ -35,20 +35,12 @@ _profile_option = click.option(
 )
 
 
-@click.group(
-    cls=LazyGroup,
-    table=COMMANDS,
-    examples=_DIAGNOSE_EXAMPLES,
-)
+@click.group(cls=LazyGroup, table=COMMANDS, examples=_DIAGNOSE_EXAMPLES)
 def command() -> None:
     """Many winches and sessions: the runs of an indexed folder."""
 
 
-@click.command(
-    "diagnose",
-    cls=ToolCommand,
-    examples=_DIAGNOSE_EXAMPLES,
-)
+@click.command("diagnose", cls=ToolCommand, examples=_DIAGNOSE_EXAMPLES)
 @click.argument("folder", metavar="DIR")
 @_profile_option
 @own_effects_option()

@@ -28,10 +28,7 @@ COMMANDS = {
 @click.group(
     cls=LazyGroup,
     table=COMMANDS,
-    examples=(
-        "winchkit library index .",
-        "winchkit library list . --winch A",
-    ),
+    examples=("winchkit library index .", "winchkit library list . --winch A"),
 )
 def command() -> None:
     """Tables of the runs of a folder, kept beside them and renewed from them."""
@@ -40,10 +37,7 @@ def command() -> None:
 @click.command(
     "index",
     cls=ToolCommand,
-    examples=(
-        "winchkit library index .",
-        "winchkit library index . -p bench-spiral --json",
-    ),
+    examples=("winchkit library index .", "winchkit library index . -p bench-spiral --json"),
 )
 @click.argument("folder", metavar="DIR")
 @click.option("-p", "--profile", metavar="P", type=PROFILE, help="Profile of the winches.")

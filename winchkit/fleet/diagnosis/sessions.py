@@ -1,7 +1,7 @@
 """Parameters of one set of effects, fitted to the runs of one winch and one session.
 
-The set of effects is chosen once for a fleet (:func:`common_terms`), so that the first member of an
-equivalence set cannot alternate between sessions. Estimates are given in the coordinates in which a
+The set of effects is chosen once for a fleet, so that the first member of an equivalence set cannot
+alternate between sessions. Estimates are given in the coordinates in which a
 fit is linear: an amplitude, the reciprocal of a stiffness, the cosine and sine part of an amplitude
 with a phase, the logarithm of a shape parameter. There they are normally distributed also near
 zero, which estimates over time and over winches require.
@@ -23,13 +23,11 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
-from winchkit.fleet.diagnosis.meta_analysis import shared_effects
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -60,22 +58,6 @@ def null_term(effect: Effect) -> Term:
     """An effect without influence: amplitudes at their null, shapes at their typical value."""
     shapes = {p.name: p.typical for p in effect.parameters if p.role == "shape"}
     return Term(effect, {**effect.null, **shapes})
-
-
-def common_terms(found: Mapping[str, Diagnosis], catalogue: Catalogue) -> tuple[Term, ...]:
-    """Effects named in any diagnosis of a fleet, at their null: of every set of
-    :func:`shared_effects` the one that most diagnoses allow; orders as they were found."""
-    out: dict[str, Term] = {}
-    for shared in shared_effects(found, catalogue):
-        effect = catalogue[shared.effects[0]]
-        whole = {
-            p.name: shared.parameters[p.name].value
-            for p in effect.parameters
-            if p.whole and p.name in shared.parameters
-        }
-        term = null_term(effect)
-        out.setdefault(effect.id, Term(effect, {**term.values, **whole}))
-    return tuple(out.values())
 
 
 def fit_session(

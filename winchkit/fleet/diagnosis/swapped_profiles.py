@@ -99,9 +99,7 @@ def swapped_profiles(
 
 
 def swapped_by_radius(
-    parameters: Iterable[FleetParameter],
-    profiles: Mapping[str, WinchProfile],
-    catalogue: Catalogue,
+    parameters: Iterable[FleetParameter], profiles: Mapping[str, WinchProfile], catalogue: Catalogue
 ) -> tuple[Swap, ...]:
     """Exchanged profiles by the cable length per motor angle, r/i on the first layer. The median
     difference from the declared value, which all have in common, is no evidence; the scatter beyond

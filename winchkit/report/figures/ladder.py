@@ -49,9 +49,7 @@ def error_ladder(
     return _figure("errors", title, rows, changed if extended else "", source)
 
 
-def fleet_ladders(
-    found: Mapping[str, Comparison] | Mapping[str, Diagnosis],
-) -> list[Figure]:
+def fleet_ladders(found: Mapping[str, Comparison] | Mapping[str, Diagnosis]) -> list[Figure]:
     """A ladder per output with a row per winch, the output with the largest ratio first."""
     out: list[tuple[float, Figure]] = []
     for output in dict.fromkeys(name for one in found.values() for name in one.outputs):

@@ -310,7 +310,6 @@ def _cell_shapes(cells: GridCells, x: Range, y: Range) -> list[Shape]:
 
 
 def _class(value: float, cells: GridCells) -> str:
-    """Style of a cell."""
     number = int(np.searchsorted(cells.levels, abs(value) * (1 + 1e-9), side="right"))
     if cells.signed:
         return f"{'below' if value < 0 else 'above'}-{number}" if number else "neutral"

@@ -28,13 +28,7 @@ from winchkit.report.figures.figure import (
     RunMark,
 )
 from winchkit.report.figures.layout import density_levels
-from winchkit.report.figures.reduction import (
-    bin_edges,
-    bin_means,
-    decimated,
-    period_of,
-    strongest,
-)
+from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, period_of, strongest
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import output_name, variable_name
 from winchkit.schema.linear_axis import rotary_name

@@ -91,10 +91,7 @@ def falls_of(answer: Answer) -> list[tuple[Mapping[str, float], Mapping[str, flo
     ladder = _Ladder(engine, result, {added: after})
     own = answer.diagnosis.steps[: _n_own(answer)]
     grown = [ladder.error(*added[:count]) for count in range(len(added) + 1)]
-    return [
-        *((_without_own(answer, step, ladder), after) for step in own),
-        *pairwise(grown),
-    ]
+    return [*((_without_own(answer, step, ladder), after) for step in own), *pairwise(grown)]
 
 
 def _n_own(answer: Answer) -> int:

@@ -243,7 +243,6 @@ def _chosen(
     output: str | Sequence[str] | None,
     run: str | Sequence[str] | None,
 ) -> list[OutputTrace | PoseTrace]:
-    """Traces of the chosen outputs and runs."""
     if not traces:
         raise UsageError("this result holds no samples to draw; call compare or diagnose again")
     outputs = list(dict.fromkeys(trace.output for trace in traces))

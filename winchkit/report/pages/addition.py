@@ -14,13 +14,7 @@ from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, lead
 from winchkit.report.reproducibility import CommandLine, repeat
 from winchkit.report.words.headline import worst_outputs
-from winchkit.report.words.sentence import (
-    capital,
-    gain_text,
-    moved_outputs,
-    still_text,
-    worse_text,
-)
+from winchkit.report.words.sentence import capital, gain_text, moved_outputs, still_text, worse_text
 from winchkit.report.words.vocabulary import error_scale, meaning, output_name, values_text
 
 
@@ -73,10 +67,7 @@ def _lead(
 ) -> Markup:
     term, _ = addition.added
     chip, tone = _chip(addition.outputs)
-    beside = [
-        _errors(addition.outputs),
-        *([figure_block(ladder, 480, "ladder")] if ladder else []),
-    ]
+    beside = [_errors(addition.outputs), *([figure_block(ladder, 480, "ladder")] if ladder else [])]
     rows = [
         ("Fitted to", compared_text(command.dataset, command.profile)),
         ("Error", addition_sentence(addition)),

@@ -16,12 +16,7 @@ from winchkit.report.figures.reduction import decimated
 from winchkit.report.html.markup import Markup, element, facts, formula, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
-    listed,
-    meaning,
-    output_name,
-)
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, output_name
 
 _INTERVALS = 120
 """Intervals of the drawn signature, each with its lowest and highest value."""

@@ -114,9 +114,7 @@ def data(result: Comparison | Diagnosis) -> Markup:
 
 
 def drawings(
-    figures: Sequence[OutputFigures],
-    maps: Mapping[str, Sequence[Figure]],
-    sizes: Mapping[str, str],
+    figures: Sequence[OutputFigures], maps: Mapping[str, Sequence[Figure]], sizes: Mapping[str, str]
 ) -> list[Markup]:
     """A card per output, the first open; ``sizes`` are remarks on their errors."""
     cards = []

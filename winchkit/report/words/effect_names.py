@@ -109,10 +109,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
     "joint-gravity": ("eccentric weight of the axis", "the axis carries an eccentric weight"),
     "joint-payload": ("payload on the axis", "the stated load acts on a lever of the axis"),
     "layer-thickness": ("growth of the cable layers", "the growth of the cable layers is wrong"),
-    "length-gain": (
-        "gain of the length instrument",
-        "the length instrument has a gain error",
-    ),
+    "length-gain": ("gain of the length instrument", "the length instrument has a gain error"),
     "load-gain": ("stated load", "the load differs from the one that the runs state"),
     "length-time-offset": ("delay of the length instrument", "the length instrument is delayed"),
     "load-lever": ("lever of the load", "the load acts through a lever"),

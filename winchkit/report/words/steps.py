@@ -162,9 +162,7 @@ def has_other_law(step: Step) -> bool:
 
 
 def step_text(
-    step: Step,
-    outputs: Mapping[str, OutputFit] | None = None,
-    fall: ErrorFall | None = None,
+    step: Step, outputs: Mapping[str, OutputFit] | None = None, fall: ErrorFall | None = None
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
@@ -216,7 +214,6 @@ def _alternatives(step: Step, data: str) -> list[str]:
 
 
 def _titled_values(step: Step) -> str:
-    """Title with the values of the effects."""
     if step.whole:
         return _WHOLE
     if step.refitted:

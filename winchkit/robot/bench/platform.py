@@ -113,11 +113,7 @@ class Platform(HeldPlatform):
             common = self.corrections.along(planned, self._angles()[0], clock)
             trims = self._cable_corrections(common, hold=hold)
         elif mode == "end":
-            trims = self._trims(
-                planned.pose[-1:],
-                planned.force[-1],
-                hold=hold,
-            )
+            trims = self._trims(planned.pose[-1:], planned.force[-1], hold=hold)
         self._start(
             [
                 CableMotion(

@@ -26,11 +26,7 @@ from winchkit.fit_statistics import FitStatistics
 from winchkit.model.drum import drum_of
 from winchkit.rendering import Plotted
 from winchkit.robot.calibration.candidate_effects import CandidateEffect, candidates
-from winchkit.robot.calibration.identifiability import (
-    Observability,
-    observability,
-    refuse_unfit,
-)
+from winchkit.robot.calibration.identifiability import Observability, observability, refuse_unfit
 from winchkit.robot.calibration.notes import (
     home_notes,
     instrument_notes,

@@ -14,12 +14,7 @@ from winchkit.robot.files.poses import held_unmeasured
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import reading_of, registered
-from winchkit.robot.identification.bundle_adjustment import (
-    BundleState,
-    Weights,
-    linearise,
-    place,
-)
+from winchkit.robot.identification.bundle_adjustment import BundleState, Weights, linearise, place
 from winchkit.robot.identification.equations import RobotEquations
 
 _ROUNDS = 4

@@ -79,10 +79,7 @@ def instruments_json(found: Calibrated) -> dict[str, Any]:
     if "frame" in own.free:
         for session, tracker in zip(own.sessions, own.trackers, strict=True):
             origin, turned = tracker.frame_in_base
-            frames[session] = {
-                "position": origin.tolist(),
-                "rotation": angles_of(turned).tolist(),
-            }
+            frames[session] = {"position": origin.tolist(), "rotation": angles_of(turned).tolist()}
     return {
         "fitted": sorted(own.free),
         "undeclared": sorted(found.found_instruments),

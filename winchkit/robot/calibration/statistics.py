@@ -21,9 +21,7 @@ _95 = 1.959964
 
 
 def calibration_statistics(
-    equations: RobotEquations,
-    solution: Solution,
-    estimates: Mapping[str, Estimated],
+    equations: RobotEquations, solution: Solution, estimates: Mapping[str, Estimated]
 ) -> FitStatistics:
     """Statistics of a fit of poses and parameters."""
     linear, parameters = solution.linear, equations.parameters

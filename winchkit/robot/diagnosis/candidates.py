@@ -9,12 +9,7 @@ import numpy as np
 
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
-from winchkit.effects.placement import (
-    base_of,
-    line_of_effect,
-    placements,
-    with_home_lengths,
-)
+from winchkit.effects.placement import base_of, line_of_effect, placements, with_home_lengths
 from winchkit.model.stages import Stage
 from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.bind import lines_with_home_length

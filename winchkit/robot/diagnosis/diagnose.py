@@ -38,13 +38,7 @@ from winchkit.diagnosis.selection.stepwise import (
     initial_result,
     stepwise_selection,
 )
-from winchkit.diagnosis.steps import (
-    Standing,
-    candidates_of,
-    standing_of,
-    steps_of,
-    with_standing,
-)
+from winchkit.diagnosis.steps import Standing, candidates_of, standing_of, steps_of, with_standing
 from winchkit.diagnosis.verdict.decision import remaining_share, verdict_of
 from winchkit.diagnosis.verdict.equivalence import (
     EquivalenceSet,
@@ -259,10 +253,7 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
         ),
         unexplained_share=selection.remaining,
         where=_places(selection) if verdict != "adequate" else (),
-        next_runs=(
-            *repeat,
-            *next_pose_runs(engine.regression, final.hypothesis, pairs_of(sets)),
-        ),
+        next_runs=(*repeat, *next_pose_runs(engine.regression, final.hypothesis, pairs_of(sets))),
         notes=(
             *preparation.dataset.notes,
             *missing_pose_excitation(preparation),

@@ -17,12 +17,7 @@ from winchkit.effects.placement import base_of
 from winchkit.effects.term import Term
 from winchkit.model.rotation import angles_of
 from winchkit.robot.diagnosis.diagnose import RobotAnswer
-from winchkit.robot.diagnosis.pose_design import (
-    POSES,
-    PoseOffer,
-    Question,
-    pose_offers,
-)
+from winchkit.robot.diagnosis.pose_design import POSES, PoseOffer, Question, pose_offers
 from winchkit.runs.run import Channel, Run
 
 _HIGH_POWER = 0.9

@@ -35,11 +35,7 @@ from winchkit.robot.effects.bind import robot_terms
 from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import Rows
 from winchkit.robot.identification.parameters import Parameters
-from winchkit.robot.identification.variance_components import (
-    START,
-    PoseNoise,
-    noise_of,
-)
+from winchkit.robot.identification.variance_components import START, PoseNoise, noise_of
 from winchkit.robot.mistakes.search import refuse_mistakes
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile

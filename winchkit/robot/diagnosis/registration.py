@@ -23,12 +23,7 @@ from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import rotation_residual
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.geometry.tracker import (
-    Tracker,
-    declared_tracker,
-    reading_of,
-    registered,
-)
+from winchkit.robot.geometry.tracker import Tracker, declared_tracker, reading_of, registered
 from winchkit.robot.identification.variance_components import START
 from winchkit.schema.profiles.instruments import ImuSpec
 
@@ -120,10 +115,7 @@ def registration_of(
     return Registration(
         dataset,
         tuple(made[name] for name in sorted(found)),
-        (
-            *(made[name] for name in sorted(declared)),
-            *((Term(delay, delay.null),) if late else ()),
-        ),
+        (*(made[name] for name in sorted(declared)), *((Term(delay, delay.null),) if late else ())),
     )
 
 
@@ -186,9 +178,7 @@ def _with_imu(dataset: RobotDataset, tracker: Tracker, pose: Pose) -> RobotDatas
     )
     instrument = replace(profile.instrument, imu=ImuSpec())
     return replace(
-        dataset,
-        robot=replace(profile, instrument=instrument),
-        notes=(*dataset.notes, note),
+        dataset, robot=replace(profile, instrument=instrument), notes=(*dataset.notes, note)
     )
 
 

@@ -99,9 +99,7 @@ def motion_of(time: Array, pose: Pose) -> PlatformMotion:
     # Rates of the spline are in platform axes; d(R ω)/dt = R dω/dt.
     rates = [np.einsum("kij,kj->ki", pose.rotation, turned(time, order)) for order in (1, 2)]
     return PlatformMotion(
-        pose,
-        np.hstack([place(time, 1), rates[0]]),
-        np.hstack([place(time, 2), rates[1]]),
+        pose, np.hstack([place(time, 1), rates[0]]), np.hstack([place(time, 2), rates[1]])
     )
 
 

@@ -34,11 +34,7 @@ from winchkit.model.rotation import skew
 from winchkit.robot.geometry.constraints import Constraint
 from winchkit.robot.geometry.hessian import direction_change
 from winchkit.robot.geometry.kinematics import Geometry, Pose, lever_of, structure_matrix
-from winchkit.robot.geometry.wrench import (
-    gravity_wrench,
-    weight_by_payload,
-    weight_by_rotation,
-)
+from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload, weight_by_rotation
 from winchkit.schema.profiles.robot import PlatformSpec
 
 _SEEN = 1e-3

@@ -169,13 +169,13 @@ def forward(
     begin = Pose(
         np.broadcast_to(start.position, (many, 3)), np.broadcast_to(start.rotation, (many, 3, 3))
     )
-    at_rest = _PoseSearch(geometry, given, platform if hanging else None).run(begin, steps)
-    best, other = at_rest.best, _Candidates.none(many)
+    search_all = _PoseSearch(geometry, given, platform if hanging else None)
+    best, forces, taken = search_all.run(begin, steps)
+    other = _Candidates.none(many)
     if hanging and len(rows := np.flatnonzero(~np.isfinite(best.worst))):
         at = begin[rows]
-        again = _PoseSearch(geometry, given[rows], platform, _WEAK).run(at, steps)
-        best.put(rows, again.best, np.ones(len(rows), dtype=bool))
-        at_rest.forces[rows] = again.forces
+        again, forces[rows], _ = _PoseSearch(geometry, given[rows], platform, _WEAK).run(at, steps)
+        best.put(rows, again, np.ones(len(rows), dtype=bool))
     if not hanging:
         limit = _outlying(best.worst) if search == "outlying" else search
         unmet = np.flatnonzero(np.all(np.isfinite(given), axis=1) & ~(best.worst <= limit))
@@ -185,15 +185,9 @@ def forward(
     residual = given - lengths(geometry, best.position, best.rotation)
     converged = (best.worst <= tolerance) & np.isfinite(best.worst)
     rivals = converged & (other.worst <= _BETTER * np.maximum(best.worst, RESOLUTION))
-    at_rest.forces[~converged] = np.nan
-    return PosesFound(
-        best.pose_where(converged),
-        converged,
-        residual,
-        other.pose_where(rivals),
-        at_rest.forces,
-        at_rest.steps,
-    )
+    forces[~converged] = np.nan
+    found, second = best.pose_where(converged), other.pose_where(rivals)
+    return PosesFound(found, converged, residual, second, forces, taken)
 
 
 @dataclass(frozen=True)
@@ -275,7 +269,7 @@ def _search_further(
             starts.rotation[left, round_].reshape(-1, 3, 3),
         )
         pulled = np.repeat(given[rows[left]], count, axis=0)
-        ends = _PoseSearch(geometry, pulled, None).run(at, _EARLY * len(_LONGEST)).best
+        ends, *_ = _PoseSearch(geometry, pulled, None).run(at, _EARLY * len(_LONGEST))
         for number in range(count):
             new = ends.of(np.arange(number, len(left) * count, count))
             new.apart[:] = distance(new.pose, begin[left])
@@ -337,14 +331,6 @@ def _starts(geometry: Geometry, given: Array, start: Pose) -> Pose:
     )
 
 
-class _AtRest(NamedTuple):
-    """Ends of the iterations."""
-
-    best: _Candidates
-    forces: Array
-    steps: int
-
-
 class _Cables(NamedTuple):
     """Active set of each pose: taut cables, and the cable tightened last."""
 
@@ -360,8 +346,8 @@ class _PoseSearch:
     rank: float = _RANK
     """Share of the largest singular value below which one is zero, of a hanging platform."""
 
-    def run(self, start: Pose, steps: int) -> _AtRest:
-        """Step all poses until each has converged or has failed."""
+    def run(self, start: Pose, steps: int) -> tuple[_Candidates, Array, int]:
+        """Step all poses until each has converged or has failed; with the forces and the steps."""
         many = len(self.given)
         position, rotation = start.position.copy(), start.rotation.copy()
         forces = np.full_like(self.given, np.nan)
@@ -394,9 +380,7 @@ class _PoseSearch:
         # A slack cable is longer than the distance that it spans.
         size = np.where(cables.taut, np.abs(residual), -residual)
         worst = np.where(converged, np.max(size, axis=1), np.inf)
-        return _AtRest(
-            _Candidates(position, rotation, worst, distance(there, start)), forces, taken
-        )
+        return _Candidates(position, rotation, worst, distance(there, start)), forces, taken
 
     def _settle(
         self, at: Pose, forces: Array, cables: _Cables, which: NDArray[np.intp]

@@ -28,12 +28,7 @@ from winchkit.robot.geometry.kinematics import (
 from winchkit.robot.geometry.loops import CableLine
 from winchkit.robot.geometry.tracker import Tracker, declared_tracker
 from winchkit.robot.geometry.wrench import gravity_wrench
-from winchkit.schema.profiles.robot import (
-    COORDINATES,
-    Coordinate,
-    PlatformSpec,
-    RobotProfile,
-)
+from winchkit.schema.profiles.robot import COORDINATES, Coordinate, PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 _TURN = 2 * np.pi

@@ -27,11 +27,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.robot.geometry.constraints import Constraint
 from winchkit.robot.geometry.kinematics import Pose
-from winchkit.robot.geometry.pose_estimation import (
-    Iteration,
-    estimated_pose,
-    moved_pose,
-)
+from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose, moved_pose
 
 Mask = NDArray[np.bool_]
 Progress = Callable[[int, float], None]

@@ -18,12 +18,7 @@ from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import rotation_residual
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.geometry.tracker import (
-    Tracker,
-    declared_tracker,
-    reading_of,
-    registered,
-)
+from winchkit.robot.geometry.tracker import Tracker, declared_tracker, reading_of, registered
 
 LARGEST_SCALE = 0.01
 """Largest relative error of a tracker's scale that is fitted: a hundred times that of a camera

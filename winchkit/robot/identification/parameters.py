@@ -18,13 +18,7 @@ from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.instruments import LARGEST_SCALE, InstrumentValues
-from winchkit.schema.profiles.robot import (
-    CENTRE_STD,
-    PRIORS,
-    PriorName,
-    PriorSpec,
-    RobotProfile,
-)
+from winchkit.schema.profiles.robot import CENTRE_STD, PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 from winchkit.units import dimension_of, parse
 

@@ -235,9 +235,7 @@ def _next(following: Sequence[NextPose]) -> Markup:
     ]
     head = ["", "x [mm]", "y [mm]", "z [mm]", "roll [°]", "pitch [°]", "yaw [°]", "gain [bit]"]
     return table(
-        "In this order. The cables hold the platform in each; check for collisions.",
-        head,
-        rows,
+        "In this order. The cables hold the platform in each; check for collisions.", head, rows
     )
 
 

@@ -382,8 +382,7 @@ def _arrow_parser() -> Parser:
                 arrow.ReadOptions(use_threads=False, column_names=names),
                 arrow.ParseOptions(quote_char=False),
                 arrow.ConvertOptions(
-                    column_types=dict.fromkeys(names, pa.float64()),
-                    null_values=["", "nan", "-nan"],
+                    column_types=dict.fromkeys(names, pa.float64()), null_values=["", "nan", "-nan"]
                 ),
             )
         except pa.ArrowInvalid:

@@ -190,8 +190,7 @@ def _keep_first(found: dict[str, Section], section: Section, findings: EdsFindin
         first.contradicts = True
     else:
         findings.fault(
-            section.line,
-            f"{twice} and differs from line {first.line}; take out one of them",
+            section.line, f"{twice} and differs from line {first.line}; take out one of them"
         )
 
 

@@ -78,10 +78,7 @@ class DrumSpec(Table):
         if self.build_up is not None and self.kind != "squared":
             yield "build_up", f"belongs to a squared drum, not to a {self.kind} one"
         if self.layer_growth is not None and self.kind not in LAYERED:
-            yield (
-                "layer_growth",
-                f"belongs to a layered drum, not to a {self.kind} one",
-            )
+            yield ("layer_growth", f"belongs to a layered drum, not to a {self.kind} one")
         if self.flange_radius is not None and self.flange_radius <= self.winding_radius:
             yield (
                 "flange_radius",

@@ -8,13 +8,7 @@ from math import isfinite
 from operator import xor
 
 from winchkit.errors import FileError
-from winchkit.schema.devices.stream import (
-    ChecksumSpec,
-    Says,
-    StatusBitsSpec,
-    StreamSpec,
-    UnitSpec,
-)
+from winchkit.schema.devices.stream import ChecksumSpec, Says, StatusBitsSpec, StreamSpec, UnitSpec
 from winchkit.schema.template import Part, fields_of
 
 

@@ -78,11 +78,7 @@ class Programmes:
 
 
 def _about(declared: Any) -> dict[str, Any]:
-    return {
-        "name": declared.name,
-        "description": declared.description,
-        "repeats": declared.repeat,
-    }
+    return {"name": declared.name, "description": declared.description, "repeats": declared.repeat}
 
 
 def _kind_of(path: Path) -> str:

@@ -26,7 +26,7 @@ def test_a_drive_that_says_nothing_is_as_its_file_says() -> None:
     assert scale.velocity == pytest.approx(6.283185307e-4)
     assert scale.torque == pytest.approx(0.003)
     assert scale.rated_torque == pytest.approx(3.0)
-    assert math.isnan(scale.rated_current)
+    assert math.isnan(scale.current)
 
 
 def test_an_encoder_of_4096_on_a_motor_of_1_27_newton_metres() -> None:

@@ -13,8 +13,6 @@ from winchkit.errors import NotPermitted
 _U32_OFF = 0xFFFFFFFF
 """6065h and 607Fh: all bits set switch the limit off (CiA 402 for 6065h; drives do so for 607Fh).
 """
-_MS = 1e-3
-"""s: unit of 6066h."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +33,7 @@ class DriveLimits:
 
     angle: tuple[float, float] = (nan, nan)
     following_error: float = nan
-    following_time: float = nan
     torque: float = nan
-    torque_positive: float = nan
-    torque_negative: float = nan
     speed: float = nan
 
 
@@ -64,10 +59,7 @@ def read_limits(node: SdoNode, scale: CountScale) -> DriveLimits:
     return DriveLimits(
         angle=(low, high) if low < high else (nan, nan),
         following_error=value(0x6065, 0, scale.angle, _U32_OFF),
-        following_time=value(0x6066, 0, _MS),
         torque=value(0x6072, 0, scale.torque),
-        torque_positive=value(0x60E0, 0, scale.torque),
-        torque_negative=value(0x60E1, 0, scale.torque),
         speed=value(0x607F, 0, scale.velocity, _U32_OFF),
     )
 

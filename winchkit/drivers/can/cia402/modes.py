@@ -99,10 +99,7 @@ def mode_named(number: int) -> str:
 
 def status_words(mode: str, status: int) -> tuple[str, ...]:
     """Bits of a status word beside the state, in words; without a mode those that all share."""
-    common = {
-        int(StatusBit.WARNING): "warning",
-        int(_LIMIT): "internal limit active",
-    }
+    common = {int(StatusBit.WARNING): "warning", int(_LIMIT): "internal limit active"}
     meaning = common | dict(MODES[mode].bits if mode in MODES else {})
     return tuple(word for mask, word in meaning.items() if status & mask)
 

@@ -42,11 +42,6 @@ class CountScale:
         """N m."""
         return self.torque / _PER_MILLE
 
-    @property
-    def rated_current(self) -> float:
-        """A."""
-        return self.current / _PER_MILLE
-
     def angle_counts(self, angle: float) -> int:
         """Counts of a motor angle (rad); raises NotPermitted beyond 32 bits."""
         return _counts(angle, self.angle, _I32, "angle", "rad")

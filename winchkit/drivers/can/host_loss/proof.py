@@ -68,9 +68,7 @@ class HostLoss:
 
 
 def prove(
-    mechanism: Mechanism,
-    watch: HeartbeatConsumer,
-    emergencies: Collection[Emergency],
+    mechanism: Mechanism, watch: HeartbeatConsumer, emergencies: Collection[Emergency]
 ) -> Proof:
     """Withhold the life signs from a disabled, operational drive until it reports their absence.
 

@@ -51,10 +51,7 @@ ENTRIES: dict[str, tuple[tuple[int, int, str], ...]] = {
         (0x1014, 0, "EMCY identifier; bit 31: it sends none"),
         (0x1029, 1, "network state after an error"),
     ),
-    "heartbeat": (
-        (0x1016, 1, "watches (node << 16 | ms)"),
-        (0x1017, 0, "sends every, ms"),
-    ),
+    "heartbeat": ((0x1016, 1, "watches (node << 16 | ms)"), (0x1017, 0, "sends every, ms")),
 }
 """Groups of objects that are shown as they are: index, sub-index, what it is."""
 
