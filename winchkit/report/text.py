@@ -164,17 +164,23 @@ def step_lines(
     known = dict(enumerate(falls))
     told = reported_steps(diagnosis)
     small = named_only([diagnosis.steps[index] for index in told], diagnosis.outputs)
-    for number, index in enumerate(told, start=1):
+    number, left_out, full = 0, list[Step](), False
+    for index in told:
         step = diagnosis.steps[index]
+        if most is not None and lines and (full or step in small):
+            left_out.append(step)
+            continue
         text = step_text(step, diagnosis.outputs, known.get(index))
-        own = paragraph(text, f"{number}. ", "   ")
+        own = paragraph(text, f"{number + 1}. ", "   ")
         if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
             own += paragraph(doubts, "   ? ", "     ")
-        if most is not None and lines and (step in small or len(lines) + len(own) > most):
-            left_out = [diagnosis.steps[one] for one in told[number - 1 :]]
-            return [*lines, *paragraph(_named_only(left_out, small), "", "  ")]
+        full = most is not None and bool(lines) and len(lines) + len(own) > most
+        if full:
+            left_out.append(step)
+            continue
+        number += 1
         lines += own
-    return lines
+    return [*lines, *paragraph(_named_only(left_out, small), "", "  ")] if left_out else lines
 
 
 def _named_only(left_out: Sequence[Step], small: Sequence[Step]) -> str:
