@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.signal import lfilter
 
 from winchkit import diagnose, read_profile
 from winchkit.arrays import Array
 from winchkit.diagnosis.results import Diagnosis, Step
 from winchkit.diagnosis.verdict.compensation import beside_unknown
+from winchkit.report.words.sentence import headline
 from winchkit.runs.run import Channel, Run
 
 COULOMB, VISCOUS, QUADRATIC, INERTIA = 0.03, 4e-4, 8e-6, 2e-4
@@ -47,8 +49,10 @@ def motion(fastest: float) -> tuple[Array, Array]:
     return time, np.convolve(wanted, bell / bell.sum(), mode="same")
 
 
-def runs(coulomb: float, viscous: float, quadratic: float, *, factor: float = 1.0) -> list[Run]:
-    """Two motions, each recorded twice."""
+def runs(
+    coulomb: float, viscous: float, quadratic: float, *, factor: float = 1.0, lag: float = 0.0
+) -> list[Run]:
+    """Two motions, each recorded twice; ``lag`` is that of a low-pass of the torque, s."""
     out = []
     for number, fastest in enumerate((130.0, 130.0, 80.0, 80.0)):
         time, speed = motion(fastest)
@@ -59,6 +63,8 @@ def runs(coulomb: float, viscous: float, quadratic: float, *, factor: float = 1.
             + viscous * speed
             + quadratic * speed * np.abs(speed)
         )
+        kept = float(np.exp(-STEP / lag)) if lag else 0.0
+        torque = np.asarray(lfilter([1 - kept], [1, -kept], torque))
         seen = factor * torque[::EVERY]
         noise = np.random.default_rng(number).normal(0.0, NOISE, len(seen))
         channels = {
@@ -90,13 +96,19 @@ def test_known_friction_that_moves_for_a_law_that_is_not_known_is_open(tmp_path:
 
 
 @pytest.mark.slow
-def test_a_factor_on_the_torque_is_named_with_the_values_that_it_changes(tmp_path: Path) -> None:
-    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, factor=1.08))
-    assert len(found.steps) > 1
-    assert all("factor" in {doubt.code for doubt in step.doubts} for step in found.steps)
-    (text, *_) = [d.text for d in found.steps[0].doubts if d.code == "factor"]
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_a_factor_on_the_torque_is_named_with_the_values_that_it_changes(
+    tmp_path: Path, lag: float
+) -> None:
+    """Beside a lag of the torque as well, which is a step of its own."""
+    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, factor=1.08, lag=lag))
+    moved = [step for step in found.steps if step.refitted]
+    assert len(moved) > 1
+    assert all("factor" in {doubt.code for doubt in step.doubts} for step in moved)
+    (text, *_) = [d.text for d in moved[0].doubts if d.code == "factor"]
     assert float(text.partition("wrong by +")[2].partition("%")[0]) == pytest.approx(8.0, abs=0.5)
-    assert not any(step.certain for step in found.steps)
+    assert not any(step.certain for step in moved)
+    assert "A torque constant that is wrong by +" in headline(found)
 
 
 @pytest.mark.slow

@@ -95,12 +95,16 @@ def with_compensations(
                 doubted = _doubted(out[place], "curve", f"a curve over {words}", len(own))
                 out[place] = replace(doubted, curve=doubted.curve or words)
     torque = [place for place in at if terms[at[place]].effect.outputs == ("motor_torque",)]
-    if any(steps[place].refitted for place in torque):
-        together = _Together.of(engine, result, file, [at[place] for place in torque])
+    refitted = [place for place in torque if steps[place].refitted]
+    # An effect that the profile lacks, such as a lag, may also act beside a wrong factor.
+    for own in (torque, refitted) if refitted else ():
+        together = _Together.of(engine, result, file, [at[place] for place in own])
         if together is not None and (factor := together.factor()) is not None:
-            what = f"a torque constant that is wrong by {100 * (factor - 1):+.1f} %"
-            for place in torque:
-                out[place] = _doubted(out[place], "factor", what, len(torque))
+            wrong = f"{100 * (factor - 1):+.1f} %".replace("-", "−")
+            what = f"a torque constant that is wrong by {wrong}"
+            for place in own:
+                out[place] = _doubted(out[place], "factor", what, len(own))
+            break
     if not any(step.curve for step in out):
         return tuple(out)
     weights = result.noise.inverse_sigma(engine.regression)

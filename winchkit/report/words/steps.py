@@ -133,7 +133,11 @@ def cause(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> str:
         first, many = step_title(refitted[0]), len(refitted)
         have = "effect of the profile has" if many == 1 else "effects of the profile have"
         others = f"{many} {have} other values"
-        if not steps[0].refitted:
+        factors = [doubt.text for doubt in refitted[0].doubts if doubt.code == "factor"]
+        if factors:
+            # One number comes before the many that it replaces.
+            parts.insert(0, f"{factors[0].partition(' explains')[0]}, or {others}")
+        elif not steps[0].refitted:
             parts.append(others)
         else:
             parts.insert(0, first if many == 1 else f"{others}; first, {first}")
