@@ -25,9 +25,8 @@ from winchkit.diagnosis.residuals.attribution import (
     attributions,
     harmonics,
 )
-from winchkit.diagnosis.residuals.common_force import common_force
+from winchkit.diagnosis.residuals.findings import findings
 from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
-from winchkit.diagnosis.residuals.unresolved_acceleration import unresolved_acceleration
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, NextRun, OutputFit, Step
 from winchkit.diagnosis.search import (
     ProgressCallback,
@@ -371,12 +370,10 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         ),
     )
     pairs = pairs_of(sets)
-    advice = _VARY if noise.from_repeats else _REPEAT
-    repeat = [NextRun((), advice)] if verdict == "undecided" else []
+    advice = NextRun((), _VARY if noise.from_repeats else _REPEAT)
+    repeat = [advice] if verdict == "undecided" else []
     lost = sorted(known.refuted - known.deciding) if noise.from_repeats else []
-    late = (*unrelated(lost), *unresolved_acceleration(regression, final.residual))
-    if verdict in ("unknown", "partly"):
-        late += common_force(regression, found.initial_model.residual)
+    late = findings(regression, verdict, found.initial_model.residual, final.residual)
     diagnosis = Diagnosis(
         verdict=verdict,
         outputs=outputs,
@@ -393,7 +390,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         where=where if verdict != "adequate" else (),
         next_runs=(*repeat, *next_runs(regression, pairs, weights_of(regression, noise))),
         notes=(*dataset.notes, *missing_excitation(regression), *best.notes),
-        sanity=(*dataset.sanity, *late),
+        sanity=(*dataset.sanity, *unrelated(lost), *late),
         used_share=dataset.used_share,
         removed=dataset.removed,
         caveats=dataset.caveats,

@@ -13,6 +13,7 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.common_force import COMMON_FORCE
+from winchkit.diagnosis.residuals.outlying_run import OUTLYING
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset, Step
 from winchkit.effects.card import sparkline
 from winchkit.effects.effect import parameter_name
@@ -427,7 +428,7 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     if isinstance(result, Diagnosis) and unrelated_outputs(result):
         told |= {UNRELATED}
     if isinstance(result, Diagnosis):
-        told |= {COMMON_FORCE}
+        told |= {COMMON_FORCE, OUTLYING}
     most = {} if all_shares else {"most": 1}
     findings = finding_texts([f for f in result.sanity if f.code not in told], **most)
     caveats = [caveat_text(code) for code in result.caveats if code not in told]

@@ -561,3 +561,12 @@ def test_a_run_may_begin_in_motion_or_with_a_step_like_later_ones() -> None:
 def _drive(time: Array, angle: Array, torque: Array) -> Run:
     channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
     return Run("r", time, channels)
+
+
+@pytest.mark.parametrize(("factor", "found"), [(1.0, False), (180 / np.pi, True)])
+def test_an_angle_in_degrees_turns_faster_than_any_motor(factor: float, found: bool) -> None:
+    """A motor at 1,700 rpm; without a velocity only its speed shows the unit."""
+    time = np.arange(0.0, 4.0, 0.01)
+    run = Run("r", time, {"motor_angle": Channel(factor * 178.0 * time, "rad")})
+    codes = [(f.code, f.channel) for f in inspect_run(run).findings if f.code == "wrong-factor"]
+    assert codes == [("wrong-factor", "motor_angle")] * found

@@ -10,6 +10,7 @@ from winchkit.diagnosis.design.programmes import ISOLATING
 from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.common_force import COMMON_FORCE
+from winchkit.diagnosis.residuals.outlying_run import OUTLYING
 from winchkit.diagnosis.results import Diagnosis, OutputFit
 from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
@@ -208,6 +209,10 @@ def _instruments_text(diagnosis: Diagnosis) -> str:
             f"Check the instrument of the {names}, its wiring and its column in the file: no "
             "effect of the motion explains what differs between repeats."
         )
+    outlying = [f for f in diagnosis.sanity if f.code == OUTLYING]
+    if outlying:
+        named = [f"{output_name(f.channel)} of {f.run}: {f.text}" for f in outlying]
+        return f"{capital('; '.join(named))}."
     common = [f.text for f in diagnosis.sanity if f.code == COMMON_FORCE]
     return f"To explain the rest: {common[0]}." if common else ""
 

@@ -1,4 +1,8 @@
-"""Consistency of a motor's velocity with its angle: the integral of one is the other."""
+"""Consistency of a motor's velocity with its angle, and speeds that no motor has.
+
+The integral of the velocity is the angle. An angle in degrees or counts that is read as radians
+turns faster than any servo motor; without a velocity nothing else of a run shows it.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,12 @@ INCONSISTENT = "inconsistent-velocity"
 LATE = "late-velocity"
 """Code of the finding on a velocity behind a filter."""
 
+_RPM = 60 / (2 * np.pi)
+"""Of one rad/s."""
+_FASTEST = 50_000 / _RPM
+"""rad/s; spindles reach 60,000 rpm, servo motors 20,000."""
+_FASTEST_SHARE = 0.9
+"""Quantile of the speeds that is compared: an angle that wraps jumps in fewer samples."""
 _LATE = 0.5
 """Lateness in sampling intervals from which it is reported; rule of thumb."""
 _RANGE = 0.8, 1.25
@@ -79,6 +89,24 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
     yield from _judged(run, name, Slope(slope, std))
     if _RANGE[0] < slope < _RANGE[1]:
         yield from _late(run, name, run[angle])
+
+
+def implausible_speed(run: Run, winch: str = "") -> Iterator[Finding]:
+    """Finding on a ``motor_angle`` that turns faster than any servo motor; value: the factor of
+    degrees, the most frequent cause."""
+    name = f"{winch}.motor_angle" if winch else "motor_angle"
+    if name not in run or len(run) < _LEAST_SAMPLES:
+        return
+    speeds = np.abs(np.diff(run[name])) / run.interval
+    speeds = speeds[np.isfinite(speeds)]
+    fastest = float(np.quantile(speeds, _FASTEST_SHARE)) if len(speeds) else 0.0
+    if fastest > _FASTEST:
+        rpm, degrees = fastest * _RPM, np.degrees(1.0)
+        text = (
+            f"the unit looks wrong: the motor turns at {rpm:,.0f} rpm, more than any servo motor "
+            f"({_FASTEST * _RPM:,.0f} rpm); in degrees it is {rpm / degrees:,.0f} rpm"
+        )
+        yield Finding("wrong-factor", run.name, name, degrees, text)
 
 
 def _late(run: Run, name: str, angle: Array) -> Iterator[Finding]:

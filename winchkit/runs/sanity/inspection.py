@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.consistency import velocity_consistency
+from winchkit.runs.sanity.consistency import implausible_speed, velocity_consistency
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.ground import ground_mask, load_on_ground
 from winchkit.runs.sanity.low_pass import low_pass
@@ -61,6 +61,7 @@ def inspect_run(run: Run, *, has_cable: bool = True) -> Inspection:
     held = np.zeros(len(run), dtype=bool)
     for winch in run.winches():
         out += velocity_consistency(run, winch)
+        out += implausible_speed(run, winch)
         own = run.of_winch(winch)
         held = ground_mask(own) if has_cable else held
         out += load_on_ground(own, held)
