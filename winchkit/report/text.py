@@ -381,7 +381,8 @@ def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
         return []
     listed = main_patterns(diagnosis.where)
     if not verbose:
-        listed = remaining_patterns(diagnosis)[:2] if diagnosis.verdict != "explained" else []
+        most = 1 if diagnosis.verdict == "explained" else 2
+        listed = remaining_patterns(diagnosis)[:most] if told else []
     for where in listed:
         lines += entries([where_text(where)])
         if not where.frequency:
