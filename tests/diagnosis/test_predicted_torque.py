@@ -85,6 +85,23 @@ def test_a_model_with_the_other_sign_is_said(tmp_path: Path) -> None:
     assert "friction" not in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("sign", "mended"), [(-1.0, "-tau_model"), (1e3, "tau_model*0.001")], ids=["sign", "unit"]
+)
+def test_of_a_wrong_model_its_own_column_is_mended(
+    tmp_path: Path, sign: float, mended: str
+) -> None:
+    """It used to be the measured torque that was multiplied by 1000."""
+    run, profile = arm(tmp_path, sign=sign)
+    run.write_text(run.read_text().replace("predicted_torque", "tau_model"))
+    result = invoke("diagnose", run, "-p", profile, "--predicted", "motor_torque=tau_model")
+    assert "the motor torque that is measured or 'tau_model' is wrong" in result.stderr
+    assert f"--column 'predicted_torque={mended} [N m]'" in result.stderr
+    out, column = tmp_path / "imported", f"predicted_torque={mended} [N m]"
+    assert invoke("import", run, "--column", column, "--yes", "-o", out).exit_code == 0
+    assert invoke("diagnose", out / "arm.csv", "-p", profile).stdout.startswith("EXPLAINED")
+
+
 @pytest.mark.parametrize("way", ["import", "option"])
 def test_a_column_of_another_name_is_named(tmp_path: Path, way: str) -> None:
     run, profile = arm(tmp_path)

@@ -62,9 +62,11 @@ def test_the_initial_speed_errs_as_much_as_is_stated(tmp_path: Path, noise: floa
     assert found.meaningful_until is not None
 
 
-def test_under_loops_the_reference_channel_is_followed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rate", [100, 20])
+def test_under_loops_the_reference_channel_is_followed(tmp_path: Path, rate: int) -> None:
+    """And its torque, straight between the samples, makes the motion again."""
     profile = profile_of(tmp_path, AXIS + CONTROL)
-    goal = torque_run(np.zeros(500))
+    goal = torque_run(np.zeros(5 * rate), rate)
     path = 0.3 * np.sin(goal.time) ** 2
     goal = replace(goal, channels={"motor_angle": Channel(path, "rad")})
     run = forward(profile, reference=goal, initial_speed=0.0)
@@ -72,4 +74,5 @@ def test_under_loops_the_reference_channel_is_followed(tmp_path: Path) -> None:
     errors = {e.driven_by: e for e in simulated_errors([followed], profile)}
     assert set(errors) == {"torque", "reference"}
     assert errors["reference"].rms < 1e-4
+    assert errors["torque"].rms < 0.06 / rate
     assert errors["reference"].meaningful_until is None

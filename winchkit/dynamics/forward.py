@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from winchkit.arguments import number, positive, require_type
 from winchkit.arrays import Array
@@ -32,7 +33,7 @@ from winchkit.units import GRAVITY
 _COARSEST = 0.01
 """Relative error of a step beyond which a simulation is none; numerical."""
 _REFERENCE_STEP = 1e-3
-"""s: between the points of a programme's reference, whose acceleration builds up in 0.3 s."""
+"""s: between the points of a reference, whose acceleration builds up in 0.3 s in a programme."""
 _TEMPERATURE = 20.0
 """°C: at which every thermal effect is zero."""
 GOAL = "reference_angle"
@@ -230,11 +231,16 @@ def setup_of(
         signals["load"] = run["load"]
     if is_torque:
         signals["torque"] = values
-    else:
-        signals["goal"] = values
-        is_measured = driving == "motor_angle" and "motor_velocity" in run
-        signals["goal_speed"] = run["motor_velocity"] if is_measured else np.gradient(values, time)
-    return Setup(f"{run.name}-forward", time, angle, speed, Inputs(time, signals), mass)
+        return Setup(f"{run.name}-forward", time, angle, speed, Inputs(time, signals), mass)
+    is_measured = driving == "motor_angle" and "motor_velocity" in run
+    path = CubicHermiteSpline(
+        time, values, run["motor_velocity"] if is_measured else np.gradient(values, time)
+    )
+    # A straight path between coarse samples would fall behind its own speed in each of them.
+    fine = np.linspace(time[0], time[-1], max(2, round(np.ptp(time) / _REFERENCE_STEP) + 1))
+    signals = {name: np.interp(fine, time, given) for name, given in signals.items()}
+    signals |= {"goal": path(fine), "goal_speed": path(fine, 1)}
+    return Setup(f"{run.name}-forward", time, angle, speed, Inputs(fine, signals), mass)
 
 
 def driving_part(run: Run, profile: WinchProfile, *, is_torque: bool) -> Run:

@@ -176,11 +176,12 @@ class _WholeRun:
         self,
         profile: WinchProfile,
         terms: Sequence[Term],
-        fitted: int,
+        moved: Sequence[Sequence[Term]],
         random: np.random.Generator,
     ) -> Array:
         """Deviations of the cosine transform of its torque's noise, (n,): of what the effects leave
-        along the measured motion, less what the noise of the angle adds to that."""
+        along the measured motion at any values, with one of them ``moved`` each, less what the
+        noise of the angle adds to that."""
         channel = self.run.channels["motor_angle"]
         angle = channel.values
         other = angle + self.noise[0] * random.standard_normal(len(angle))
@@ -188,7 +189,10 @@ class _WholeRun:
         clock = smoothed(replace(self.run, channels=channels), profile)
         left = torque_left(profile, terms, self.setup, angle, self.clock)
         seen = torque_left(profile, terms, self.setup, other, clock) - left
-        return spectrum(left, seen, fitted)
+        near = [torque_left(profile, one, self.setup, angle, self.clock) - left for one in moved]
+        columns = np.array([one / max(float(np.linalg.norm(one)), 1e-300) for one in near]).T
+        left = left - columns @ np.linalg.lstsq(columns, left)[0]
+        return spectrum(left, seen, len(moved))
 
     def pieces(self, profile: WinchProfile, terms: Sequence[Term]) -> Iterator[_Piece]:
         """Stretches that are fitted: one where effects have states that no instrument reads."""
@@ -324,7 +328,7 @@ class _Shooting:
             ftol=_SETTLED / sum(len(piece.measured) for piece in self.pieces),
         )  # fmt: skip
         terms, states = self.at(found.x)
-        deviations = self._deviations(np.asarray(found.jac), found.fun, terms, states)
+        deviations = self._deviations(np.asarray(found.jac), found.fun, found.x)
         fitted_speeds = deviations[count + 1 :: 2]
         std, place = list[dict[str, float]](), 0
         for index, term in enumerate(self.terms):
@@ -375,11 +379,7 @@ class _Shooting:
         count, ends, (terms, states) = len(self.start), self.ends_at(x), self.at(x)
         here = self.residual(ends, states)
         out = np.zeros((len(here), len(x)))
-        _, high = self.bounds
-        for j in range(count):
-            step = _STEP * max(abs(float(x[j])), 0.1)
-            moved = x[:count].copy()
-            moved[j] += step if x[j] + step <= high[j] else -step
+        for j, moved in enumerate(self._moved(x)):
             there = self.residual(self.ends(self.terms_at(moved), states), states)
             out[:, j] = (there - here) / (moved[j] - x[j])
         for which in range(2):
@@ -393,14 +393,23 @@ class _Shooting:
                 out[:, count + 2 * k + which] = (self.residual(own, own_states) - here) / step
         return out
 
-    def _deviations(
-        self, jacobian: Array, residual: Array, terms: Sequence[Term], states: Array
-    ) -> Array:
+    def _moved(self, x: Array) -> Iterator[Array]:
+        """Coordinates (p,) of unknowns, each time another one moved by a step."""
+        count, (_, high) = len(self.start), self.bounds
+        for j in range(count):
+            step = _STEP * max(abs(float(x[j])), 0.1)
+            moved = x[:count].copy()
+            moved[j] += step if x[j] + step <= high[j] else -step
+            yield moved
+
+    def _deviations(self, jacobian: Array, residual: Array, x: Array) -> Array:
         """Standard deviations of the unknowns: how they follow a motion that is simulated under
         another noise of the torque and seen with the noise of the instruments (parametric
         bootstrap, one step of the fit each), of which one in 20 at least has errors after it as
         small as those of the fit: what is left of a torque has noise of the acceleration too. A
         draw whose motion ends, as by a slack cable, is left out; NaN where all end."""
+        terms, states = self.at(x)
+        near = [self.terms_at(moved) for moved in self._moved(x)]
         scale = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
         unit, random = jacobian / scale, np.random.default_rng(0)
         follow = np.linalg.pinv(unit.T @ unit, hermitian=True) @ unit.T
@@ -410,7 +419,7 @@ class _Shooting:
             setup = replace(one.setup, angle=angle, speed=speed)
             law = law_of(self.profile, terms, setup)
             known = motion_of(self.profile, terms, setup, _TOLERANCE, law).angle
-            spread = one.torque_noise(self.profile, terms, len(self.start), random)
+            spread = one.torque_noise(self.profile, terms, near, random)
             runs.append((setup, law, known, spread))
         samples = sum(len(piece.measured) for piece in self.pieces)
         moved, left = [], []

@@ -4,8 +4,9 @@ A simulation integrates errors of the measured torque twice, over the whole run:
 simulated motion are as long as the run, and samples or parts of it are no repeats. The torque's own
 errors are short: what the model leaves of the torque along the measured motion is taken as
 stationary noise, whose variances per band of a cosine transform (orthonormal DCT-II) are estimated.
-Slow parts of it that the fitted values explain are missing in it: the lowest band is wide beside
-their number, and divided by its degrees of freedom.
+What other values of the effects would explain is taken out before, since those of the motion are
+not those of the torque; the lowest band is wide beside their number, and divided by its degrees of
+freedom.
 """
 
 from __future__ import annotations

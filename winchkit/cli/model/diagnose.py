@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from winchkit import wings
 from winchkit.cli.core.command import ToolCommand
-from winchkit.cli.core.messages import is_verbose, suggest_next
+from winchkit.cli.core.messages import is_verbose, note, suggest_next
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -139,7 +140,7 @@ def _suggest(
     """Next command: calibrate a robot, add the first effect, plan runs or write an effect."""
     if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
-    if column := _mending(diagnosis):
+    if column := _mending(diagnosis, asked.predicted):
         suggest_next("import", runs, "--column", column, "-o", "corrected")
         return
     from winchkit.report.words.sentence import unrelated_outputs
@@ -177,14 +178,23 @@ def _added(step: Step) -> str:
     return step.effects[0] if len(step.effects) == 1 else ""
 
 
-def _mending(diagnosis: Diagnosis) -> str:
-    """Column of an import that corrects the first wrong channel, where nothing was searched."""
+def _mending(diagnosis: Diagnosis, predicted: str | None) -> str:
+    """Column of an import that corrects the first wrong channel, where nothing was searched; of a
+    prediction by another model, ``OUTPUT=COLUMN``, that of the model: either may be wrong."""
     from winchkit.diagnosis.data.sanity import ALARMING
     from winchkit.diagnosis.data.sign_and_scale import mending_column
+    from winchkit.runs.predicted import OF_OUTPUT
 
-    if diagnosis.steps or diagnosis.candidates:
+    wrong = next((f for f in diagnosis.sanity if f.code in ALARMING), None)
+    if wrong is None or diagnosis.steps or diagnosis.candidates:
         return ""
-    return next((mending_column(f) for f in diagnosis.sanity if f.code in ALARMING), "")
+    output, _, column = (predicted or "").partition("=")
+    if not column or wrong.channel != output:
+        return mending_column(wrong)
+    note(f"the {output.replace('_', ' ')} that is measured or '{column}' is wrong; of the latter:")
+    own = OF_OUTPUT[output]
+    mended = mending_column(replace(wrong, channel=own, value=1 / wrong.value))
+    return mended.replace(f"={own}", f"={column}").replace(f"=-{own}", f"=-{column}")
 
 
 def answer_page(answer: Answer, title: str, asked: Asked) -> str:

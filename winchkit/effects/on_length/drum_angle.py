@@ -124,9 +124,12 @@ def _gear_backlash_carried(after: Path, before: Path, _at: At, values: Values) -
 
 
 def _gear_backlash_at_state(path: Path, at: At, values: Values) -> Path:
+    """The share rises evenly over the last fiftieth: a rotor that would jump over its begin could
+    come to rest there after endlessly many reversals."""
     drum_angle = path.value + values["gap"] * values["start"]
-    meshes = _meshes(path.value, drum_angle, values["gap"])
-    return Path(drum_angle, path.slope * np.where(meshes, 1.0, values["held"]))
+    to_flank = 2.0 * np.abs(values["start"]) - _ON_THE_FLANK
+    near = np.clip(to_flank / (1.0 - _ON_THE_FLANK), 0.0, 1.0)
+    return Path(drum_angle, path.slope * (values["held"] + (1.0 - values["held"]) * near))
 
 
 def _gear_backlash_rate(path: Path, at: At, values: Values) -> Array:
