@@ -23,7 +23,9 @@ def poses() -> tuple[Array, Array, Array, Array]:
     return t, position, yaw, np.stack([np.cos(yaw / 2), zero, zero, np.sin(yaw / 2)], axis=1)
 
 
-def optitrack(path: Path, bodies: tuple[str, ...] = ("Platform",)) -> None:
+def optitrack(
+    path: Path, bodies: tuple[str, ...] = ("Platform",), *, with_markers: bool = True
+) -> None:
     """Motive 1.2: a line of settings, five rows of labels; every body with a marker of its own."""
     t, position, _, q = poses()
     settings = (
@@ -35,7 +37,9 @@ def optitrack(path: Path, bodies: tuple[str, ...] = ("Platform",)) -> None:
         columns = [("Rigid Body", body, "Rotation", axis) for axis in "XYZW"]
         columns += [("Rigid Body", body, "Position", axis) for axis in "XYZ"]
         columns += [("Rigid Body", body, "Mean Marker Error", "")]
-        columns += [("Rigid Body Marker", f"{body}:Marker1", "Position", axis) for axis in "XYZ"]
+        if with_markers:
+            marker = ("Rigid Body Marker", f"{body}:Marker1", "Position")
+            columns += [(*marker, axis) for axis in "XYZ"]
         for kind, name, quantity, axis in columns:
             for row, text in zip(
                 labels, (kind, name, "A1B2C3D4E5F60718", quantity, axis), strict=True
@@ -47,9 +51,14 @@ def optitrack(path: Path, bodies: tuple[str, ...] = ("Platform",)) -> None:
         for _ in bodies:
             cells += [f"{q[k, n]:.9f}" for n in (1, 2, 3, 0)]
             cells += [*(f"{1e3 * v:.6f}" for v in position[k]), "0.0002"]
-            cells += [f"{1e3 * v + 25:.6f}" for v in position[k]]
+            cells += [f"{1e3 * v + 25:.6f}" for v in position[k]] if with_markers else []
         lines.append(",".join(cells))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def optitrack_body(path: Path) -> None:
+    """The same without markers: as many columns of a rotation as of all else."""
+    optitrack(path, with_markers=False)
 
 
 def vicon(path: Path) -> None:

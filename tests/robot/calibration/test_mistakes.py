@@ -46,6 +46,27 @@ def test_each_kind_of_mistake_is_named_alone(kind: str, tmp_path: Path) -> None:
     assert mistake.codes & set(codes[0].split(" | "))
 
 
+@pytest.mark.parametrize("rows", [-7, 11])
+def test_a_table_that_begins_later_is_named(rows: int, tmp_path: Path) -> None:
+    """The first poses of one table are missing, and the last ones of the other."""
+    t, count = recorded(SCENE), abs(rows)
+    early, late = slice(None, -count), slice(count, None)
+    motor, pose = (early, late) if rows > 0 else (late, early)
+    table = replace(t, motor=t.motor[motor], position=t.position[pose], angles=t.angles[pose])
+    assert found(tmp_path, table.csv()) == [f"rows:{rows}"]
+
+
+@pytest.mark.parametrize(
+    ("factors", "code"),
+    [((1.0, 1.0, -1.0), "rotation-sign:yaw"), ((10 / 9,) * 3, "rotation-unit:gon")],
+)
+def test_signs_and_gon_of_rotations_are_named(
+    factors: tuple[float, ...], code: str, tmp_path: Path
+) -> None:
+    table = recorded(SCENE)
+    assert found(tmp_path, replace(table, angles=table.angles * factors).csv()) == [code]
+
+
 @pytest.mark.slow
 def test_two_mistakes_are_named_together(tmp_path: Path) -> None:
     first, second = mistake_of("swap", 3, LINES), mistake_of("shift", 4, LINES)

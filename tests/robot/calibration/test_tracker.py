@@ -12,13 +12,16 @@ import pytest
 from calibration_cases import EXACT, measured, robot, rows
 from command_line import invoke
 from model_files import answer
+from robot_poses.mistaken import Scene, profile_text, recorded
 from robot_poses.station import Station, about
 from robot_poses.truth import csv
 from winchkit.catalog import find
+from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot import robot_of
 from winchkit.robot.calibration.calibrate import calibrate, split
 from winchkit.robot.calibration.prediction import rms
-from winchkit.robot.files.poses import joined
+from winchkit.robot.files.poses import joined, read_poses
+from winchkit.runs import read_run
 from winchkit.schema.profiles.instruments import FrameSpec, InstrumentSpec, TrackerSpec
 from winchkit.schema.read import read_robot
 
@@ -78,11 +81,34 @@ def test_a_tracker_set_up_anew_is_fitted_as_such(case: str, angles: bool) -> Non
     if angles:
         assert rms(found.validation_after.angle) < 1.3 * 1e-3 * 3**0.5
     assert any("the poses require" in text for text in found.warnings)
-    assert ("frame" in expected) == any("check [home] first" in t for t in found.warnings)
+    assert any("check [home] first" in text for text in found.warnings)
     own = found.equations.instruments_at(found.values)
     assert own is not None
     if expected == {"reflector"}:
         np.testing.assert_allclose(own.trackers[0].offset, station.reflector, atol=5e-5)
+
+
+def test_a_target_that_is_turned_on_the_platform_is_fitted_as_such() -> None:
+    """In a known frame; a home that is turned by 3 degrees gives the same data."""
+    fit = measured(seen(Station()))
+    c, s = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
+    shown = rotation_of(*fit.angles.T) @ np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+    found = calibrate(robot(), *split(replace(fit, angles=angles_of(shown))))
+    assert found.found_instruments == {"mounting"}
+    assert rms(found.validation_after.angle) < 1.3 * 1e-3 * 3**0.5
+    assert any("a home pose that is turned" in text for text in found.warnings)
+
+
+def test_drums_of_another_size_are_not_a_trackers_scale(tmp_path: Path) -> None:
+    scene = Scene("ipanema3", True, True, 50, 2e-5, 2e-3, 6)
+    table, path, run = recorded(scene), tmp_path / "robot.toml", tmp_path / "poses.csv"
+    path.write_text(profile_text(scene.robot, known_frame=True))
+    run.write_text(replace(table, motor=1.05 * table.motor).csv())
+    profile = read_robot(path)
+    found = calibrate(robot_of(profile), *split(read_poses([read_run(run)], profile)))
+    assert found.found_instruments == frozenset()
+    assert rms(found.validation_after.distance) < 2e-4
+    assert [ratio.change for ratio in found.ratios.lines] == pytest.approx([-1 / 21] * 8, abs=0.015)
 
 
 def test_orientations_of_true_poses_are_predicted_to_a_thirtieth_of_a_degree() -> None:

@@ -12,11 +12,15 @@ import pytest
 from model_files import answer
 from robot_poses.hidden import BASE, profile_text
 from robot_poses.moving import log
+from small_robots import RADIUS, RATIO, small_robot
 from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.robot import Pose, rotation_of
+from winchkit.robot.diagnosis.compare import compared
+from winchkit.robot.diagnosis.errors import rms
 from winchkit.robot.dynamics.smoothed_motion import smoothed_motion
 from winchkit.robot.geometry.tracker import Tracker
+from winchkit.runs import read_run
 
 DELAY = 0.02
 DRUM = 3e-4
@@ -92,3 +96,30 @@ def test_a_declared_delay_is_corrected(robot: Path) -> None:
     )
     rms = [one["outputs"]["platform_position"]["rms"] for one in (before, after)]
     assert rms[1] < 5e-5 < 10 * rms[1] < rms[0]
+
+
+def test_forces_of_a_point_mass_in_motion_carry_its_weight_and_inertia(tmp_path: Path) -> None:
+    """Three of the six components of the wrench are those of cables at every pose."""
+    exits = np.array([(0, 0, 2.5), (3, 0, 2.5), (3, 2.5, 2.5), (0, 2.5, 2.5), (1.5, 1.2, 0)], float)
+    home, size, mass, noise = np.array((1.5, 1.25, 1.0)), np.array((0.3, 0.2, 0.2)), 4.0, 0.1
+    rng, time = np.random.default_rng(4), np.arange(300) / 50
+    rate = 2 * np.pi * np.array((0.3, 0.2, 0.25))
+    position = home + size * np.sin(time[:, None] * rate)
+    force = mass * (-size * rate**2 * np.sin(time[:, None] * rate) + (0.0, 0.0, 9.80665))
+    away = exits - position[:, None]
+    length = np.linalg.norm(away, axis=2)
+    pull = np.swapaxes(away / length[..., None], 1, 2)
+    inverse = np.linalg.pinv(pull)
+    tension = 40 + (inverse @ (force - 40 * pull.sum(axis=2))[..., None])[..., 0]
+    motor = (np.linalg.norm(exits - home, axis=1) - length) / RADIUS * RATIO
+    columns = [time[:, None], motor, tension + rng.normal(0, noise, tension.shape), position]
+    names = ["time [s]", *(f"{k + 1}.motor_angle [rad]" for k in range(5))]
+    names += [*(f"{k + 1}.tension [N]" for k in range(5)), *(f"platform_{a} [m]" for a in "xyz")]
+    rows = np.concatenate(columns, axis=1).tolist()
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(names), *(",".join(map(repr, r)) for r in rows)]) + "\n")
+    points = [tuple(point) for point in exits.tolist()]
+    robot = small_robot(points, [(0.0, 0.0, 0.0)] * 5, ("x", "y", "z"), home=tuple(home.tolist()))
+    error = compared([read_run(path)], robot.profile).errors["tension"]
+    assert np.isfinite(error).all()
+    assert rms("tension", error) < 2 * noise

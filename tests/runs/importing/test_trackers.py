@@ -15,6 +15,7 @@ from tracker_exports import (
     matrix,
     numbered_quaternion,
     optitrack,
+    optitrack_body,
     poses,
     spatial_analyzer,
     vicon,
@@ -30,6 +31,7 @@ from winchkit.runs.importing.clocks.joint import joined
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.session import guesses_of
 from winchkit.runs.importing.streams import Streams, streams_of
 
 
@@ -46,7 +48,7 @@ def channels(guess: Guess) -> dict[str, Array]:
 @pytest.mark.parametrize(
     "write",
     [
-        *(optitrack, vicon, vicon_objects, vicon_helical, aruco),
+        *(optitrack, optitrack_body, vicon, vicon_objects, vicon_helical, aruco),
         *(spatial_analyzer, leica, matrix, numbered_quaternion),
     ],
 )
@@ -127,6 +129,21 @@ def test_of_several_markers_the_user_names_one(tmp_path: Path) -> None:
     assert found["platform_x"] == pytest.approx(7 + np.arange(30.0))
 
 
+def test_a_column_of_one_of_several_markers_is_given_beside_another_file(tmp_path: Path) -> None:
+    motors, markers = tmp_path / "motors.csv", tmp_path / "markers.csv"
+    head = "Point;1.motor_angle [rad];2.motor_angle [rad]\n"
+    motors.write_text(head + "".join(f"P{k};{k};{-k}\n" for k in range(30)))
+    rows = [f"P{k},{m},{m + k},2,3" for k in reversed(range(30)) for m in (3, 7)]
+    markers.write_text("\n".join(["image,marker_id,tvec_x,tvec_y,tvec_z", *rows]) + "\n")
+    tables = [read_table(motors), read_table(markers)]
+    (question,) = guesses_of(tables, Answers())[1].questions
+    assert question.options == ('--body "3"', '--body "7"')
+    chosen = Answers(body="7", columns=(read_column("platform_x=7 tvec_x [m]"),))
+    whole, (joint,) = joined([streams_of(guess) for guess in guesses_of(tables, chosen)])
+    assert joint.method == "names"
+    assert run_of(whole, {})["platform_x"] == pytest.approx(7 + np.arange(30.0))
+
+
 POINTS = "P003;1300;2;3\nP001;1100;2;3\nCENTRE;0;0;0\nP002;1200;2;3\n"
 """Of a tracker, in another order, and one that the controller does not have."""
 
@@ -168,6 +185,13 @@ def test_points_are_joined_by_their_names(
     assert "CENTRE of" in joint.text
 
 
+@pytest.mark.parametrize("spelled", [lambda t: t.replace("P00", "P"), str.lower])
+def test_points_may_be_spelled_otherwise(spelled: Callable[[str], str], tmp_path: Path) -> None:
+    whole, (joint,) = joined([*points(tmp_path, spelled(POINTS), "Name;X;Y;Z\n")])
+    assert joint.method == "names"
+    assert run_of(whole, {})["platform_x"] == pytest.approx([1.1, 1.2, 1.3])
+
+
 def test_a_point_that_stands_twice_is_not_joined(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"tracker.txt:2: the point 'P001' stands in 2 rows"):
         joined(
@@ -200,6 +224,26 @@ def test_poses_are_joined_row_by_row_with_the_motor_angles(tmp_path: Path) -> No
     assert run["2.motor_angle"][5] == pytest.approx(np.radians(-15))
     assert run["1.tension"][5] == 105
     assert run["platform_y"] == pytest.approx(poses()[1][:, 1], abs=1e-8)
+
+
+def test_rows_that_a_tracker_did_not_see_are_left_out(tmp_path: Path) -> None:
+    path, motors = tmp_path / "poses.csv", tmp_path / "motors.csv"
+    optitrack_body(path)
+    lines = path.read_text().splitlines()
+    for unseen in (4, 31):
+        frame, time, *cells = lines[7 + unseen].split(",")
+        lines[7 + unseen] = ",".join([frame, time, *[""] * len(cells)])
+    path.write_text("\n".join(lines) + "\n")
+    count = len(poses()[0])
+    motors.write_text("1.motor_angle [rad]\n" + "".join(f"{k}\n" for k in range(count)))
+    parts = [streams_of(guess_columns(read_table(one))) for one in (motors, path)]
+    kept = np.delete(np.arange(count), (4, 31))
+    for pair in (parts, parts[::-1]):
+        whole, (joint,) = joined(pair)
+        run = run_of(whole, {})
+        assert joint.text.startswith("joined row by row (58 rows); line 12, 39 of")
+        assert run["1.motor_angle"] == pytest.approx(kept)
+        assert run["platform_x"] == pytest.approx(poses()[1][kept, 0], abs=1e-8)
 
 
 def _captured(kind: str) -> str:

@@ -17,6 +17,9 @@ from winchkit.robot.identification.parameters import EFFECTS
 _NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _WORSE_ROTATION = 1.5
 """Ratio of the held-out rotation errors after and before above which a warning is due."""
+_ODD_ROTATION = 0.01
+"""Standard deviation of rotations above which a warning is due, rad: five times that of a usual
+tracker's angles (rule of thumb)."""
 _COARSE_RATIO = 5.0
 """Standard deviation of positions, in that of the exit points' prior, above which a warning is due
 (rule of thumb: a camera may be coarser than a drawing)."""
@@ -43,6 +46,14 @@ _OF_TRACKER = {
 }
 
 
+_LIKE_HOME = {
+    "frame": "elsewhere looks the same as another frame, but for the priors of the exit points",
+    "reflector": "elsewhere looks the same as another reflector offset",
+    "mounting": "turned looks the same as other axes of the target",
+}
+"""What another home pose cannot be distinguished from."""
+
+
 def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> Iterator[str]:
     """Numbers of instruments that were fitted, and the datum, in words."""
     before = declared.instruments.free if declared.instruments else frozenset()
@@ -51,11 +62,8 @@ def instrument_notes(declared: RobotEquations, chosen: FitEnd) -> Iterator[str]:
             f"the poses require {' and '.join(found)} to be other than the robot's file has: "
             "fitted beside the geometry. Declare it as unknown in [instrument]"
         )
-    if "frame" in chosen.free - before:
-        yield (
-            "a home pose that is elsewhere looks the same as another frame, but for the priors of "
-            "the exit points: check [home] first"
-        )
+    if alike := [text for name, text in _LIKE_HOME.items() if name in chosen.free - before]:
+        yield f"a home pose that is {' and '.join(alike)}: check [home] first"
     if "frame" in chosen.free:
         own = chosen.equations.robot.profile.instrument.tracker.datum
         kept = {
@@ -116,7 +124,7 @@ def worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
     ]
 
 
-def _disagreements(equations: RobotEquations, weights: Weights) -> list[str]:
+def _disagreements(equations: RobotEquations, weights: Weights) -> Iterator[str]:
     """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
     exits = equations.parameters.std[equations.parameters.block["exit_point"]]
     prior_std, sigma = float(exits.max()), weights.sigma
@@ -124,14 +132,20 @@ def _disagreements(equations: RobotEquations, weights: Weights) -> list[str]:
         "closure": "gearbox.direction, the lines' order, [home] and the motor angles there",
         "position": "that the poses are of this robot, in its base frame",
     }
+    turned = sigma.get("rotation", 0.0)
+    if turned > _ODD_ROTATION:
+        yield (
+            f"rotations and geometry disagree by {np.degrees(turned):.3g} deg: check the unit and "
+            "the convention of the rotations"
+        )
     # A camera may well be coarser than a drawing.
     most = {"closure": prior_std, "position": _COARSE_RATIO * prior_std}
-    return [
-        f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
-        f"standard deviation of the exit points' prior: check {cause}"
-        for kind, cause in checks.items()
-        if sigma.get(kind, 0.0) > most[kind]
-    ]
+    for kind, cause in checks.items():
+        if sigma.get(kind, 0.0) > most[kind]:
+            yield (
+                f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than "
+                f"the standard deviation of the exit points' prior: check {cause}"
+            )
 
 
 def warnings_of(

@@ -235,6 +235,8 @@ def _fitted_with_tracker(
             trial
             for more in combinations(_left(own.free), count + 1)
             for trial in _variants(equations, own, own.free | set(more), predicted)
+            # Drums of another size than the file's look like another scale.
+            if abs(_first_tracker(trial).scale) < LARGEST_SCALE
         ]
         for count in range(len(_left(own.free)))
     ]
@@ -258,7 +260,7 @@ def _fitted_with_tracker(
         if best is not None and not any(_shows_more(best, trial) for trial in trials):
             break
         fits = [fitted(trial, options, progress) for trial in trials if is_near(trial)]
-        fits = [fit for fit in fits if fit.is_plausible]
+        fits = [fit for fit in fits if fit.is_plausible and not fit.at_bound]
         if first is not None:
             fits = [fit for fit in fits if fit.error < _LEAST_FALL * first.error]
         chosen = None
@@ -272,8 +274,8 @@ def _fitted_with_tracker(
             break
         best = chosen
     if best is None:
-        return declared, fitted(declared, options, progress)
-    return declared, best if best is first else _mounted(best, predicted, options, progress)
+        best = fitted(declared, options, progress)
+    return declared, _mounted(best, predicted, options, progress)
 
 
 def _starting_at_home(equations: RobotEquations) -> tuple[RobotEquations, float]:
@@ -438,10 +440,12 @@ def _shows_more(first: FitEnd, wider: RobotEquations) -> bool:
 
 def _mounted(best: FitEnd, predicted: Pose, options: Options, progress: ProgressCallback) -> FitEnd:
     """The fit with the target's axes free, where the measured rotations require it."""
-    own = best.equations.instruments
-    if own is None or "rotation" not in best.equations.kinds or "mounting" in own.free:
+    own = _instruments(best.equations)
+    if "rotation" not in best.equations.kinds or "mounting" in own.free:
         return best
     trial = _registered(best.equations, own, own.free | {"mounting"}, predicted)
+    if not _shows_more(best, trial):
+        return best
     found = fitted(trial, options, progress)
     turned = (rms(fit.errors.angle) for fit in (found, best))
     after, before = turned

@@ -225,6 +225,9 @@ class PoseRegression(Regression):
     def _force_basis(self) -> tuple[Array, Array]:
         to_forces, to_cables = force_basis(self.robot.structure(self.point.pose))
         if self.dataset.moves:
+            # Guides carry the other wrenches of a planar robot at every pose.
+            carried = np.isfinite(to_forces).any(axis=(0, 2))
+            to_forces, to_cables = to_forces[:, carried], to_cables[..., carried]
             turn = continuous(to_cables)
             return np.swapaxes(turn, 1, 2) @ to_forces, to_cables @ turn
         return to_forces, to_cables

@@ -37,6 +37,7 @@ from winchkit.robot.identification.instruments import InstrumentValues
 from winchkit.robot.mistakes.adjustment import ANGLE, adjusted, adjustment_of, misfit
 from winchkit.robot.mistakes.table import (
     MIRRORED,
+    MOST_ROWS,
     POSITION_UNITS,
     UNKNOWN,
     UNKNOWN_ROTATIONS,
@@ -287,12 +288,14 @@ class _MistakeSearch:
             yield _Trial(motors, closure)
             return
         shifts: list[tuple[int, tuple[Mistake, ...]]] = [(0, ())]
-        shifts += [(int(m.code.partition(":")[2]), (m,)) for m in row_mistakes()]
+        furthest = MOST_ROWS if motors else max(MOST_ROWS, len(self.measured) // 3)
+        shifts += [(int(m.code.partition(":")[2]), (m,)) for m in row_mistakes(furthest)]
         for shift, of_rows in shifts:
             if len(motors) + len(of_rows) > most:
                 continue
-            seen = self.measured.position[rows - shift]
-            known = np.isfinite(pose.position[:, 0])
+            there = np.isin(rows - shift, np.arange(len(self.measured)))
+            seen = self.measured.position[np.where(there, rows - shift, 0)]
+            known = np.isfinite(pose.position[:, 0]) & there
             for left_handed in (False, True):
                 turned, scale, error = _registration(
                     seen[known], pose.position[known], left_handed=left_handed

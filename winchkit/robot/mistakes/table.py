@@ -26,8 +26,9 @@ from winchkit.model.rotation import (
 from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.robot import Robot
 
-_MOST_ROWS = 3
-"""Rows by which the poses may be shifted against the motor angles; rule of thumb."""
+MOST_ROWS = 3
+"""Rows by which the poses may be shifted against the motor angles; alone a third of the table.
+Rule of thumb."""
 _MOTOR_UNITS = {
     "deg": (np.pi / 180, "degrees"),
     "turns": (2 * np.pi, "turns"),
@@ -101,9 +102,9 @@ def motor_mistakes(robot: Robot) -> Iterator[Mistake]:
         )
 
 
-def row_mistakes() -> list[Mistake]:
+def row_mistakes(most: int = MOST_ROWS) -> list[Mistake]:
     """Rows of the poses shifted against those of the motor angles."""
-    return [_shift(rows) for rows in range(-_MOST_ROWS, _MOST_ROWS + 1) if rows]
+    return [_shift(rows) for rows in range(-most, most + 1) if rows]
 
 
 def _shift(rows: int) -> Mistake:
@@ -163,7 +164,8 @@ UNKNOWN = Mistake(
 UNKNOWN_ROTATIONS = Mistake(
     "rotations-unlike",
     "the measured rotations are not those of these poses",
-    "no unit or convention explains it: check them, or leave their columns out",
+    "no unit or convention explains it: check them and whether a cable slipped or a motor lost its "
+    "zero between two rows, or leave their columns out",
     lambda m: m,
 )
 
@@ -205,18 +207,28 @@ def rotation_mistakes() -> Iterator[Mistake]:
         "convert them to roll, pitch and yaw or to quaternions",
         rotation_by,
     )
+    for k, name in enumerate(("roll", "pitch", "yaw")):
+        sign = np.where(np.arange(3) == k, -1.0, 1.0)
+        yield Mistake(
+            f"rotation-sign:{name}",
+            f"the rotations have the other sign of {name}",
+            f"negate platform_{name}",
+            _of("angles", _times(sign)),
+        )
     for order, columns in product(permutations("xyz"), permutations(range(3))):
         if (order, columns) == (("z", "y", "x"), (0, 1, 2)):
             continue
         yield _euler("".join(order), columns)
-    for factor, code, words in (
-        (np.pi / 180, "deg", "degrees, and are read as radians"),
-        (180 / np.pi, "rad", "radians, and are read as degrees"),
+    in_header = "write their unit into the header, e.g. 'platform_roll [deg]'"
+    for factor, code, words, cure in (
+        (np.pi / 180, "deg", "degrees, and are read as radians", in_header),
+        (180 / np.pi, "rad", "radians, and are read as degrees", in_header),
+        (0.9, "gon", "gon, and are read as degrees", "multiply them by 0.9"),
     ):
         yield Mistake(
             f"rotation-unit:{code}",
             f"the rotations are in {words}",
-            "write their unit into the header, e.g. 'platform_roll [deg]'",
+            cure,
             _of("angles", _times(factor)),
         )
 

@@ -13,6 +13,7 @@ from typing import Any
 from winchkit.errors import UsageError, suggest
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.formats.arithmetic import with_derived
+from winchkit.runs.importing.long_table import by_kind, marker_column
 from winchkit.runs.importing.table import ColumnTable
 from winchkit.runs.importing.units.known import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.runs.importing.units.spelling import read_unit
@@ -200,6 +201,7 @@ def answers_of(table: ColumnTable, tables: Sequence[ColumnTable], answers: Answe
         having = [t for t in tables if any(c.source == item.source for c in t.columns)]
         having = having or [t for t in tables if with_derived(t, [item.source]) is not t]
         having = having or [t for t in tables if t.column(item.source) is not None]
+        having = having or [t for t in tables if _of_bodies(t, item.source)]
         return not item.source or not having or any(t is table for t in having)
 
     own = tuple(item for item in answers.columns if is_own(item))
@@ -213,6 +215,12 @@ def answers_of(table: ColumnTable, tables: Sequence[ColumnTable], answers: Answe
     if is_of_others(answers.kind):
         answers = replace(answers, kind="")
     return answers
+
+
+def _of_bodies(table: ColumnTable, source: str) -> bool:
+    """Whether a column is one of a body, of a table whose rows are of several."""
+    marker = marker_column(table)
+    return marker is not None and by_kind(table, marker.source).column(source) is not None
 
 
 def _is_named(table: ColumnTable, name: str) -> bool:

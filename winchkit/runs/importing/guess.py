@@ -155,7 +155,7 @@ def ask_columns(work: Work, choice: Choice) -> None:
     bases = {item.base for item in work.columns}
     asked = " ".join(option for q in work.questions for option in q.options)
     has_rate = work.answers.sample_rate or work.table.interval
-    is_pose = any(
+    is_pose = "--body" in asked or any(
         name.startswith("platform_") or name.endswith(".motor_angle") for name in channels
     )
     if not channels & {"time"} and not has_rate and not is_pose and "time=" not in asked:

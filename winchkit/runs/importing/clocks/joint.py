@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from winchkit.errors import Fault, RunError
+from winchkit.errors import Fault, RunError, some_of
 from winchkit.runs.importing.clocks.cross_correlation import (
     Agreement,
     TimedSignal,
@@ -17,7 +17,7 @@ from winchkit.runs.importing.clocks.cross_correlation import (
 )
 from winchkit.runs.importing.clocks.friction import TORQUE, correlated_without_friction
 from winchkit.runs.importing.clocks.multilateration import pose_agreement
-from winchkit.runs.importing.clocks.point_names import by_names
+from winchkit.runs.importing.clocks.point_names import by_names, unlike_names
 from winchkit.runs.importing.streams import Stream, Streams
 
 _SIGNIFICANT = 3.0
@@ -56,6 +56,8 @@ def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams,
         if paired is not None:
             first, moved, text = paired
             joint = Joint(other.path, "names", 0.0, 0.0, text)
+        elif not named.has_time or not first.has_time:
+            first, moved, joint = _by_rows(first, named)
         else:
             moved, joint = _aligned(first, named, lag)
         joints.append(joint)
@@ -96,8 +98,6 @@ def _as_named(first: Streams, other: Streams) -> Streams:
 
 def _aligned(first: Streams, other: Streams, lag: float | None) -> tuple[Streams, Joint]:
     """Another file on the clock of the first one."""
-    if not other.has_time or not first.has_time:
-        return other, _by_rows(first, other)
     stamped = other.origin - first.origin
     if lag is not None:
         moved = shifted(other, stamped + lag)
@@ -128,11 +128,24 @@ def _aligned(first: Streams, other: Streams, lag: float | None) -> tuple[Streams
     return moved, Joint(other.path, "cross-correlation", found.lag - stamped, drift, text, found)
 
 
-def _by_rows(first: Streams, other: Streams) -> Joint:
+def _by_rows(first: Streams, other: Streams) -> tuple[Streams, Streams, Joint]:
+    """Rows at the same places of both files, without those of which one file has no values."""
     counts = [len(item.time) for item in (*first.streams, *other.streams)]
-    if len(set(counts)) == 1 and len(first.streams) == len(other.streams) == 1:
-        text = f"joined row by row ({counts[0]} rows each)"
-        return Joint(other.path, "rows", 0.0, 0.0, text)
+    one_each = len(first.streams) == len(other.streams) == 1
+    if one_each and counts[0] == counts[1]:
+        text = f"joined row by row ({counts[0]} rows each){unlike_names(first, other)}"
+        return first, other, Joint(other.path, "rows", 0.0, 0.0, text)
+    whole, less = (first, other) if counts[0] > counts[1] else (other, first)
+    if one_each and all(counts) and less.streams[0].rows[-1] == max(counts) - 1:
+        kept = less.streams[0].rows
+        whole = replace(whole, streams=(whole.streams[0].at(kept),))
+        empty = [str(less.line_of(r) or r + 1) for r in range(max(counts)) if r not in kept]
+        text = (
+            f"joined row by row ({len(kept)} rows); line {some_of(empty)} of {less.path} left out, "
+            f"without values{unlike_names(first, other)}"
+        )
+        joint = Joint(other.path, "rows", 0.0, 0.0, text)
+        return (whole, less, joint) if less is other else (less, whole, joint)
     message = (
         f"has no times, and not as many rows as {first.path} ({' and '.join(map(str, counts))}); "
         "give both files a column with the names of the points, or times, e.g. by --sample-rate"

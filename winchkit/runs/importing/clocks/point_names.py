@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,6 +17,8 @@ from winchkit.runs.importing.streams import Streams
 _SHARED = 0.5
 """Share of the names of the shorter file that the other one has, at least (rule of thumb): with
 fewer the two are lists of different points."""
+_LEADING = re.compile(r"(?<![\d.])0+(?=\d)")
+"""Zeros before a number: P001 is P1."""
 _SHOWN = 6
 """Names listed in a text."""
 
@@ -24,7 +27,8 @@ def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | N
     """Rows of both files whose names both have, and a text; None without any; raises RunError."""
     if len(first.streams) != 1 or len(other.streams) != 1:
         return None
-    pairs = product(_of_samples(first), _of_samples(other))
+    pairs = list(product(_of_samples(first), _of_samples(other)))
+    pairs += [(_plain(own), _plain(theirs)) for own, theirs in pairs]
     shared = [(len(set(own) & set(theirs) - {""}), own, theirs) for own, theirs in pairs]
     count, own, theirs = max(shared, key=lambda item: item[0], default=(0, [], []))
     if not count > max(1.0, _SHARED * min(len(own), len(theirs))):
@@ -42,6 +46,18 @@ def by_names(first: Streams, other: Streams) -> tuple[Streams, Streams, str] | N
         _at(other, np.array([others[name] for name in both])),
         text,
     )
+
+
+def _plain(names: Sequence[str]) -> list[str]:
+    """Names without capitals and leading zeros, which two programs write differently."""
+    return [_LEADING.sub("", name.casefold()) for name in names]
+
+
+def unlike_names(first: Streams, other: Streams) -> str:
+    """Words for files that are not joined by the names of points which both have; else empty."""
+    if not first.names or not other.names:
+        return ""
+    return f"; by names such as '{first.names[0][0]}' and '{other.names[0][0]}' they are not"
 
 
 def _of_samples(streams: Streams) -> list[list[str]]:

@@ -12,6 +12,8 @@ _LONGEST = 200
 """Longest name with a unit, characters."""
 _PAIRS = {"[": "]", "(": ")", "{": "}"}
 _NO_UNIT = {"", "-", "--", "none", "n/a", "1", "/", "[]", "()", "bool", "no unit", "unitless"}
+_QUANTITY = "rotation"
+"""A unit behind a name; in a row of its own the quantity of several columns (OptiTrack)."""
 
 
 _SIZE = r"(?:\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?|10\s?\^\s?-?\d+|1\s?/\s?\d+)"
@@ -165,6 +167,6 @@ def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
 def is_unit_row(cells: list[str]) -> bool:
     """Whether at least half of the cells with text of a row are units."""
     given = [cell.strip() for cell in cells if cell.strip()]
-    units = [cell for cell in given if read_unit(cell)]
+    units = [cell for cell in given if cell.casefold() != _QUANTITY and read_unit(cell)]
     neutral = [cell for cell in given if cell.lower().strip("[](){}") in _NO_UNIT]
     return bool(units) and len(units) + len(neutral) >= 0.5 * len(given)
