@@ -1,4 +1,4 @@
-"""Corners of a motion between two samples, told from errors that are the same everywhere."""
+"""Corners of a motion between two samples, and errors that are the same everywhere."""
 
 from __future__ import annotations
 
