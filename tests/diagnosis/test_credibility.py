@@ -144,7 +144,7 @@ def test_a_gain_beside_friction_of_the_load_may_be_its_asymmetry(
         assert (reason is not None) == (doubted and small)
 
 
-@pytest.mark.parametrize(("turns", "counted"), [(3.0, "3 instead of 6"), (0.2, ""), (8.0, "")])
+@pytest.mark.parametrize(("turns", "counted"), [(3.0, "3 turns on the drum"), (0.2, ""), (8.0, "")])
 def test_a_radius_wrong_by_whole_layers_may_be_turns_that_were_not_counted(
     turns: float, counted: str
 ) -> None:

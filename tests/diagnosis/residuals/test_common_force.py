@@ -33,7 +33,7 @@ def test_instruments_that_agree_against_the_load_are_right(in_torque: float, com
     runs = [replace(swaying(seed, in_torque), name=f"run-{seed}") for seed in range(3)]
     found = diagnose(runs, GROOVED).diagnosis
     assert [f.channel for f in found.sanity if f.code == COMMON_FORCE] == ["motor_torque"] * common
-    assert ("without 'load_mass'" in changes_text(found)) == common
+    assert ("without 'load_mass' and 'load'" in changes_text(found)) == common
     if common:
         known = [replace(r, metadata={}) for r in runs]
         assert diagnose(known, GROOVED).diagnosis.verdict == "adequate"

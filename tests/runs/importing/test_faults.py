@@ -160,7 +160,7 @@ def test_files_that_cannot_be_read_are_refused_in_words(
 def test_a_missing_file_a_folder_and_a_fifo_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="no such file"):
         read_table(tmp_path / "none.csv")
-    with pytest.raises(RunError, match="directory"):
+    with pytest.raises(RunError, match="is a folder"):
         read_table(tmp_path)
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe")

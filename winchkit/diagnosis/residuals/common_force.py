@@ -43,7 +43,7 @@ def common_force(regression: TimeSeriesRegression, residual: Array) -> tuple[Fin
     text = (
         f"tension and motor torque have the same error ({percent(share)} of the torque's), so that "
         "the force in the cable is not that of the stated load, as where it sways or bounces; "
-        "without 'load_mass' the cell's reading is the load"
+        "without 'load_mass' and 'load' the cell's reading is the load"
     )
     return (Finding(COMMON_FORCE, "", "motor_torque", share, text),)
 

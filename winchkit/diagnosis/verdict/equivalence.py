@@ -69,7 +69,8 @@ class EquivalenceSet:
     """Equivalence set of one addition, in an order that does not depend on noise.
 
     First are the effects with the fewest parameters; of these those that are not rejected against
-    the best, those with the fewest measured inputs, and then the order of the catalogue.
+    the best, those with the fewest measured inputs, and then the order of the catalogue. Last are
+    those that fit worse, though by no more than an unknown cause may.
     """
 
     term: Term
@@ -128,6 +129,12 @@ def equivalence_set(
     aim = own_fit.chi_square + largest_loss(float(dispersed.dof.min()))
     losses = held_out(engine.regression, own_fit, dispersed, engine.regression.blocks)
     members, left_out = [_Member(own, final, own_fit)], list[Fit]()
+
+    def is_worse(fitted: Fit) -> bool:
+        return fits_worse(engine.regression, fitted, own_fit, dispersed) and _predicts_worse(
+            engine, fitted, losses, dispersed
+        )
+
     for rival in rivals:
         trial = exchange.trial(rival, goal, least, aim)
         fitted = trial.fit
@@ -136,10 +143,9 @@ def equivalence_set(
         residual = _where_explained(engine, fitted, own_fit, noise, own.effect.outputs)
         weighted = residual * dispersed.inverse_sigma(engine.regression)
         judged = replace(fitted, residual=residual, chi_square=float(weighted @ weighted))
-        worse = fits_worse(engine.regression, judged, own_fit, dispersed) and _predicts_worse(
-            engine, judged, losses, dispersed
-        )
-        member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
+        worse = is_worse(judged)
+        fits_less = not worse and judged.chi_square < fitted.chi_square and is_worse(fitted)
+        member = _Member(fitted.hypothesis.terms[-1], fitted, fitted, fits_less)
         # A wave of any order is also every law with a period: its order is a number more.
         wider = own.effect.nested_with(member.term.effect) or has_orders(member.term.effect)
         joins = (
@@ -196,6 +202,8 @@ class _Member:
     """Fit that is reported: of the named effect the final one."""
     compared: Fit
     """Fit under the variances of the comparison."""
+    fits_less: bool = False
+    """Whether it fits worse than the named effect, if not by more than an unknown cause may."""
 
 
 def _where_explained(
@@ -287,11 +295,12 @@ def _ordered(
         if count not in best or member.compared.chi_square < best[count].chi_square:
             best[count] = member.compared
 
-    def key(member: _Member) -> tuple[int, bool, int, int]:
+    def key(member: _Member) -> tuple[bool, int, bool, int, int]:
         effect = member.term.effect
         count = Coordinates(effect).n_parameters
         worse = fits_worse(engine.regression, member.compared, best[count], noise)
-        return count, worse, len(effect.needs), engine.place_in_catalogue(effect.id)
+        place = engine.place_in_catalogue(effect.id)
+        return member.fits_less, count, worse, len(effect.needs), place
 
     return sorted(members, key=key)
 
