@@ -140,6 +140,9 @@ def _drum_roundness(path: Path, at: At, values: Values) -> Path:
     return _with_wave(path, values["amplitude"], lobes * at.drum_angle, values["phase"], lobes)
 
 
+_LOBES = 2.0, 3.0, 4.0, 6.0, 8.0
+"""Oval drums, jaws of a chuck, and drums of four, six or eight bars."""
+
 DRUM_ROUNDNESS = Effect(
     id="drum-roundness",
     stage=Stage.WOUND,
@@ -167,7 +170,7 @@ DRUM_ROUNDNESS = Effect(
             low=2.0,
             high=12.0,
             role="shape",
-            grid=(2.0, 3.0, 4.0),
+            grid=_LOBES,
             whole=True,
         ),
     ),
