@@ -133,15 +133,20 @@ LOAD_COULOMB = Effect(
 )
 
 
-def _load_viscous(tension: Array, at: At, values: Values) -> Array:
+VISCOSITY = Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6)
+"""Of a friction along the cable."""
+
+
+def with_viscous_force(tension: Array, at: At, values: Values) -> Array:
+    """Tension with a friction in proportion to the speed of the cable, (n,)."""
     return tension + values["viscosity"] * at.speed
 
 
 LOAD_VISCOUS = Effect(
     id="load-viscous",
     stage=Stage.CABLE_WEIGHT,
-    parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
-    apply=_load_viscous,
+    parameters=(VISCOSITY,),
+    apply=with_viscous_force,
     outputs=("tension", "motor_torque"),
     part="load",
     variable="speed",

@@ -6,6 +6,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.on_tension.load import VISCOSITY, with_viscous_force
 from winchkit.effects.presliding import START, Presliding
 from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.friction import capstan_ratio, coulomb_ratio, stribeck
@@ -80,15 +81,11 @@ PULLEY_CAPSTAN = Effect(
 )
 
 
-def _pulley_viscous(tension: Array, at: At, values: Values) -> Array:
-    return tension + values["viscosity"] * at.speed
-
-
 PULLEY_VISCOUS = Effect(
     id="pulley-viscous",
     stage=Stage.PULLEY,
-    parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
-    apply=_pulley_viscous,
+    parameters=(VISCOSITY,),
+    apply=with_viscous_force,
     outputs=("tension", "motor_torque"),
     variable="speed",
     what="Grease and seals of every pulley have friction in proportion to the cable speed.",
