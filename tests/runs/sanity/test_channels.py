@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfilt
 
 from winchkit.runs.run import Channel, Run
+from winchkit.runs.sanity.consistency import LATE
 from winchkit.runs.sanity.factors import Slope, named_factor
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
@@ -570,3 +571,16 @@ def test_an_angle_in_degrees_turns_faster_than_any_motor(factor: float, found: b
     run = Run("r", time, {"motor_angle": Channel(factor * 178.0 * time, "rad")})
     codes = [(f.code, f.channel) for f in inspect_run(run).findings if f.code == "wrong-factor"]
     assert codes == [("wrong-factor", "motor_angle")] * found
+
+
+@pytest.mark.parametrize(("late", "words"), [(0.02, "20.0 ms late"), (-0.02, "20.0 ms ahead")])
+def test_a_velocity_beside_its_angle_in_time_is_found(late: float, words: str) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    angle, velocity = 30.0 * np.sin(1.3 * time), 39.0 * np.cos(1.3 * (time - late))
+    channels = {
+        "motor_angle": Channel(angle, "rad"),
+        "motor_velocity": Channel(velocity, "rad/s"),
+    }
+    (found,) = (f for f in inspect_run(Run("r", time, channels)).findings if f.code == LATE)
+    assert found.value == pytest.approx(late, rel=0.02)
+    assert words in found.text

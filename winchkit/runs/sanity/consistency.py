@@ -23,7 +23,7 @@ INCONSISTENT = "inconsistent-velocity"
 """Code of the finding on a velocity that is not the derivative of the motor angle."""
 
 LATE = "late-velocity"
-"""Code of the finding on a velocity behind a filter."""
+"""Code of the finding on a velocity behind a filter, or ahead; value: the lateness, s."""
 
 _RPM = 60 / (2 * np.pi)
 """Of one rad/s."""
@@ -112,11 +112,11 @@ def implausible_speed(run: Run, winch: str = "") -> Iterator[Finding]:
 def _late(run: Run, name: str, angle: Array) -> Iterator[Finding]:
     known = np.isfinite(run[name]) & np.isfinite(angle)
     late, std = lateness(run[name][known], angle[known], run.time[known])
-    if late > max(_SIGMAS * std, _LATE * run.interval):
-        text = (
-            f"it is {quantity(late, 's')} late against the motor angle, as behind a filter; where "
-            "it is used it is shifted back"
-        )
+    if abs(late) > max(_SIGMAS * std, _LATE * run.interval):
+        side = "late against the motor angle, as behind a filter"
+        if late < 0:
+            side = "ahead of the motor angle, as a command is"
+        text = f"it is {quantity(abs(late), 's')} {side}; where it is used it is shifted back"
         yield Finding(LATE, run.name, name, late, text)
 
 
