@@ -21,7 +21,7 @@ from winchkit.diagnosis.regression.cross_validation import CERTAIN, held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
-from winchkit.diagnosis.regression.run_offsets import with_run_offsets
+from winchkit.diagnosis.regression.run_offsets import may_be_zeros, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import predicts_better
 from winchkit.diagnosis.selection.stepwise import (
@@ -267,7 +267,9 @@ def with_offsets_where_better(
     if offset is None:
         return dataset, found
     other = again(offset)
-    better = predicts_better(final(other), (engine, fitted, noise))
+    ended = final(other)
+    zeros = may_be_zeros(ended[0].regression, ended[1])
+    better = zeros and predicts_better(ended, (engine, fitted, noise))
     return (offset, other) if better else (dataset, found)
 
 

@@ -128,6 +128,21 @@ def run_offsets(
     )
 
 
+def may_be_zeros(regression: TimeSeriesRegression, fit: Fit) -> bool:
+    """Whether fitted offsets of runs are still as small as those of an instrument's zero."""
+    segments, dataset = regression.run_offset_segments, regression.dataset
+    for finding in dataset.sanity:
+        places = [k for k, own in enumerate(segments) if own.output == finding.channel]
+        if finding.code == "zeroed-anew" and len(places) > 1:
+            spread = float(np.std(fit.vector[places], ddof=1))
+            runs = [segments[k].run for k in places]
+            rates = [dataset.motions[run].motor_rate for run in runs]
+            measured = [dataset.recordings[run].measured[finding.channel] for run in runs]
+            if no_zero(replace(finding, value=spread), rates, measured):
+                return False
+    return True
+
+
 def _settings(dataset: Dataset, runs: list[int]) -> list[Array]:
     """Mean load and temperature of every run, less their means, where they are known and differ."""
     signals = [dataset.recordings[run].signals for run in runs]
