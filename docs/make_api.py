@@ -32,7 +32,7 @@ SECTIONS = {
         "ListedBench",
     ),
     "Files": (
-        *("find", "check", "read_profile", "read_size"),
+        *("find", "check", "read_profile", "write_profile", "read_size"),
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
     ),
     "Runs": (
@@ -85,8 +85,9 @@ from winchkit import diagnose, read_profile, read_run
 Names of robots are in `winchkit.robot` (with more for control loops than are listed here), those of
 many winches in `winchkit.fleet`. For effects of your own there are `winchkit.effects` and
 `winchkit.model.stages` besides, for control loops `winchkit.estimation`, for tests
-`winchkit.testing`. Paths of other modules may change with any version;
-[stability.md](stability.md) says what is promised, and which call each command is.
+`winchkit.testing`. Types that these functions take and return are in `winchkit.types`,
+`winchkit.robot.types` and `winchkit.fleet.types`, for annotations. Paths of other modules may
+change with any version; [stability.md](stability.md) says what is promised, and which call each command is.
 `import winchkit` loads no other package: a name is imported when it is first used.
 `winchkit.__version__` is the version.
 """

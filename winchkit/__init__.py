@@ -2,8 +2,8 @@
 
 The public names are below, described in docs/api.md; each is imported when it is first used, so
 that ``import winchkit`` loads no numpy. Robots have theirs in ``winchkit.robot``, fleets in
-``winchkit.fleet``. ``winchkit.effects``, ``winchkit.model`` and ``winchkit.testing`` are for those
-who extend it.
+``winchkit.fleet``, types for annotations in ``winchkit.types``. ``winchkit.effects``,
+``winchkit.model`` and ``winchkit.testing`` are for those who extend it.
 """
 
 from __future__ import annotations
@@ -95,13 +95,14 @@ if TYPE_CHECKING:
     from winchkit.runs.tables import run_of as run_of
     from winchkit.runs.writer import open_writer as open_writer
     from winchkit.runs.writer import write_run as write_run
-    from winchkit.schema.programme import write_programme as write_programme
     from winchkit.schema.read import read_bench as read_bench
     from winchkit.schema.read import read_mapping as read_mapping
     from winchkit.schema.read import read_profile as read_profile
     from winchkit.schema.read import read_programme as read_programme
     from winchkit.schema.read import read_simbench as read_simbench
     from winchkit.schema.read import read_size as read_size
+    from winchkit.schema.write import write_profile as write_profile
+    from winchkit.schema.write import write_programme as write_programme
     from winchkit.sim.bench import ListedBench as ListedBench
     from winchkit.sim.bench import listed_benches as listed_benches
     from winchkit.sim.clock.simulated_clock import SimulatedClock as SimulatedClock
@@ -163,10 +164,10 @@ _HOME = homes(
         "winchkit.runs.run": "Run",
         "winchkit.runs.tables": "run_of",
         "winchkit.runs.writer": "open_writer write_run",
-        "winchkit.schema.programme": "write_programme",
         "winchkit.schema.read": (
             "read_bench read_mapping read_profile read_programme read_simbench read_size"
         ),
+        "winchkit.schema.write": "write_profile write_programme",
         "winchkit.sim.bench": "ListedBench listed_benches",
         "winchkit.sim.clock.simulated_clock": "SimulatedClock",
         "winchkit.sim.live.bench": "LiveBench",

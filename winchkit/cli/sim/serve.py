@@ -95,7 +95,7 @@ def command(
     _refuse_to_replace(path)
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
-        live.write_bench_file(path)
+        live.write_bench_file(path, replace=True)
         with (
             ControlServer(live, path, ended.set),
             _ended_by_signals(ended),
