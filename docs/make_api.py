@@ -87,8 +87,8 @@ many winches in `winchkit.fleet`. For effects of your own there are `winchkit.ef
 `winchkit.model.stages` besides, for control loops `winchkit.estimation`, for tests
 `winchkit.testing`. Types that these functions take and return are in `winchkit.types`,
 `winchkit.robot.types` and `winchkit.fleet.types`, for annotations. Paths of other modules may
-change with any version; [stability.md](stability.md) says what is promised, and which call each command is.
-`import winchkit` loads no other package: a name is imported when it is first used.
+change with any version; [stability.md](stability.md) says what is promised, and which call each
+command is. `import winchkit` loads no other package: a name is imported when it is first used.
 `winchkit.__version__` is the version.
 """
 
