@@ -42,7 +42,7 @@ SECTIONS = {
     ),
     "Diagnosis": (
         *("compare", "diagnose", "plan", "add", "remove", "forward", "export_model"),
-        *("write_addition", "write_removal", "extended_name", "undo", "ladder"),
+        *("write_addition", "write_removal", "extended_name", "undo", "ledger"),
         *("load_catalogue", "new_effect", "new_profile", "Effect", "Parameter", "sized"),
     ),
     "Estimators": ("DahlEstimator", "identify_dahl"),

@@ -81,7 +81,7 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl import DahlEstimator as DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl as identify_dahl
     from winchkit.model.sizing.sizing import sized as sized
-    from winchkit.profile_edit.history import ladder as ladder
+    from winchkit.profile_edit.history import ledger as ledger
     from winchkit.profile_edit.ledger import undo as undo
     from winchkit.profile_edit.naming import extended_name as extended_name
     from winchkit.profile_edit.new_profile import new_profile as new_profile
@@ -152,7 +152,7 @@ _HOME = homes(
         "winchkit.estimation.dahl": "DahlEstimator",
         "winchkit.estimation.dahl_identification": "identify_dahl",
         "winchkit.model.sizing.sizing": "sized",
-        "winchkit.profile_edit.history": "ladder",
+        "winchkit.profile_edit.history": "ledger",
         "winchkit.profile_edit.ledger": "undo",
         "winchkit.profile_edit.naming": "extended_name",
         "winchkit.profile_edit.new_profile": "new_profile",
