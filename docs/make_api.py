@@ -32,7 +32,7 @@ SECTIONS = {
         "ListedBench",
     ),
     "Files": (
-        *("find", "check", "read_profile", "read_size"),
+        *("find", "check", "read_profile", "write_profile", "read_size"),
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
     ),
     "Runs": (
@@ -42,7 +42,7 @@ SECTIONS = {
     ),
     "Diagnosis": (
         *("compare", "diagnose", "plan", "add", "remove", "forward", "export_model"),
-        *("write_addition", "write_removal", "extended_name", "undo", "ladder"),
+        *("write_addition", "write_removal", "extended_name", "undo", "ledger"),
         *("load_catalogue", "new_effect", "new_profile", "Effect", "Parameter", "sized"),
     ),
     "Estimators": ("DahlEstimator", "identify_dahl"),
@@ -85,9 +85,10 @@ from winchkit import diagnose, read_profile, read_run
 Names of robots are in `winchkit.robot` (with more for control loops than are listed here), those of
 many winches in `winchkit.fleet`. For effects of your own there are `winchkit.effects` and
 `winchkit.model.stages` besides, for control loops `winchkit.estimation`, for tests
-`winchkit.testing`. Paths of other modules may change with any version;
-[stability.md](stability.md) says what is promised, and which call each command is.
-`import winchkit` loads no other package: a name is imported when it is first used.
+`winchkit.testing`. Types that these functions take and return are in `winchkit.types`,
+`winchkit.robot.types` and `winchkit.fleet.types`, for annotations. Paths of other modules may
+change with any version; [stability.md](stability.md) says what is promised, and which call each
+command is. `import winchkit` loads no other package: a name is imported when it is first used.
 `winchkit.__version__` is the version.
 """
 

@@ -2,8 +2,8 @@
 
 The public names are below, described in docs/api.md; each is imported when it is first used, so
 that ``import winchkit`` loads no numpy. Robots have theirs in ``winchkit.robot``, fleets in
-``winchkit.fleet``. ``winchkit.effects``, ``winchkit.model`` and ``winchkit.testing`` are for those
-who extend it.
+``winchkit.fleet``, types for annotations in ``winchkit.types``. ``winchkit.effects``,
+``winchkit.model`` and ``winchkit.testing`` are for those who extend it.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl import DahlEstimator as DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl as identify_dahl
     from winchkit.model.sizing.sizing import sized as sized
-    from winchkit.profile_edit.history import ladder as ladder
+    from winchkit.profile_edit.history import ledger as ledger
     from winchkit.profile_edit.ledger import undo as undo
     from winchkit.profile_edit.naming import extended_name as extended_name
     from winchkit.profile_edit.new_profile import new_profile as new_profile
@@ -95,13 +95,14 @@ if TYPE_CHECKING:
     from winchkit.runs.tables import run_of as run_of
     from winchkit.runs.writer import open_writer as open_writer
     from winchkit.runs.writer import write_run as write_run
-    from winchkit.schema.programme import write_programme as write_programme
     from winchkit.schema.read import read_bench as read_bench
     from winchkit.schema.read import read_mapping as read_mapping
     from winchkit.schema.read import read_profile as read_profile
     from winchkit.schema.read import read_programme as read_programme
     from winchkit.schema.read import read_simbench as read_simbench
     from winchkit.schema.read import read_size as read_size
+    from winchkit.schema.write import write_profile as write_profile
+    from winchkit.schema.write import write_programme as write_programme
     from winchkit.sim.bench import ListedBench as ListedBench
     from winchkit.sim.bench import listed_benches as listed_benches
     from winchkit.sim.clock.simulated_clock import SimulatedClock as SimulatedClock
@@ -151,7 +152,7 @@ _HOME = homes(
         "winchkit.estimation.dahl": "DahlEstimator",
         "winchkit.estimation.dahl_identification": "identify_dahl",
         "winchkit.model.sizing.sizing": "sized",
-        "winchkit.profile_edit.history": "ladder",
+        "winchkit.profile_edit.history": "ledger",
         "winchkit.profile_edit.ledger": "undo",
         "winchkit.profile_edit.naming": "extended_name",
         "winchkit.profile_edit.new_profile": "new_profile",
@@ -163,10 +164,10 @@ _HOME = homes(
         "winchkit.runs.run": "Run",
         "winchkit.runs.tables": "run_of",
         "winchkit.runs.writer": "open_writer write_run",
-        "winchkit.schema.programme": "write_programme",
         "winchkit.schema.read": (
             "read_bench read_mapping read_profile read_programme read_simbench read_size"
         ),
+        "winchkit.schema.write": "write_profile write_programme",
         "winchkit.sim.bench": "ListedBench listed_benches",
         "winchkit.sim.clock.simulated_clock": "SimulatedClock",
         "winchkit.sim.live.bench": "LiveBench",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,12 @@ _CALLS = {
 """Public call that returns an object of a type."""
 _LONGEST_VALUE = 40
 """Characters of a wrong value that a message shows."""
+ProgressCallback = Callable[[str, float | None], None]
+"""Called with the present task and the share that is done, 0 to 1; None where it is not known."""
+
+
+def no_progress(task: str, share: float | None) -> None:
+    """Progress callback that does nothing."""
 
 
 def require_type(value: object, kind: type | tuple[type, ...], name: str) -> None:

@@ -12,10 +12,10 @@ from re import compile as pattern
 
 _DEG = 57.29577951308232
 _ANY = float("inf")
-_Ladder = tuple[tuple[float, str, float], ...]
+_Prefixes = tuple[tuple[float, str, float], ...]
 
 
-def _prefixed(unit: str) -> _Ladder:
+def _prefixed(unit: str) -> _Prefixes:
     """Prefixes of a unit for at most three digits before the point; those of kN m are usual."""
     small = (1e-4, f"µ{unit}", 1e-6), (0.1, f"m{unit}", 1e-3)
     if unit.startswith("N"):
@@ -23,7 +23,7 @@ def _prefixed(unit: str) -> _Ladder:
     return *small, (_ANY, unit, 1.0)
 
 
-_LADDERS: dict[str, _Ladder] = {
+_PREFIXES: dict[str, _Prefixes] = {
     "m": ((1e-4, "µm", 1e-6), (1.0, "mm", 1e-3), (_ANY, "m", 1.0)),
     "N": ((0.01, "mN", 1e-3), (1e3, "N", 1.0), (1e6, "kN", 1e3), (_ANY, "MN", 1e6)),
     "N/m": ((1e3, "N/m", 1.0), (1e6, "N/mm", 1e3), (_ANY, "kN/mm", 1e6)),
@@ -75,11 +75,11 @@ def scale_for(sizes: float | Sequence[float], unit: str) -> PrintScale:
     """The scale for the largest of some SI values; an unknown unit is kept."""
     values = [sizes] if isinstance(sizes, int | float) else sizes
     size = max((abs(v) for v in values if isfinite(v)), default=0.0)
-    ladder = _LADDERS.get(unit, ((_ANY, unit, 1.0),))
+    prefixes = _PREFIXES.get(unit, ((_ANY, unit, 1.0),))
     if size == 0.0:
-        label, worth = next(((n, w) for _, n, w in ladder if w == 1.0), ladder[-1][1:])
+        label, worth = next(((n, w) for _, n, w in prefixes if w == 1.0), prefixes[-1][1:])
         return PrintScale(label, worth)
-    label, worth = next((n, w) for below, n, w in ladder if size < below)
+    label, worth = next((n, w) for below, n, w in prefixes if size < below)
     return PrintScale(label, worth)
 
 

@@ -1,4 +1,4 @@
-"""Opening of regular files only: a FIFO may block without end, and a device may start an action."""
+"""Opening of regular files only, as a FIFO may block without end; none is replaced unasked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, UsageError
 
 _KINDS = {
     stat.S_IFDIR: "a folder",
@@ -47,6 +47,15 @@ def file_errors(path: str | os.PathLike[str], what: str = "written") -> Iterator
         yield
     except OSError as error:
         raise FileError(Fault(f"cannot be {what}: {error.strerror}", os.fspath(path))) from error
+
+
+def refuse_existing(target: Path, replace: bool) -> None:
+    """Raise UsageError where ``target`` exists and is not to be replaced."""
+    if target.exists() and not replace:
+        raise UsageError(
+            f"{target} exists already; name another file, or write over it "
+            "(--replace, in Python replace=True)"
+        )
 
 
 def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:

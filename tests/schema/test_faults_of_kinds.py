@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from declared import BENCH, faults_of
-from winchkit.errors import FileError
-from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
+from winchkit.errors import FileError, UsageError
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import load, read_bench, read_programme
+from winchkit.schema.write import write_programme
 from winchkit.sim.live.bench_file import write_bench
 
 CASES: dict[str, tuple[str, list[tuple[int, str]]]] = {
@@ -208,6 +209,8 @@ def test_a_temperature_is_written_and_read_and_belongs_to_a_question(tmp_path: P
     path = tmp_path / "warm.toml"
     programme = Programme("warm", (ProgrammeStep(ask="warm it", temperature=35.0), move(1.0)))
     write_programme(programme, path)
+    with pytest.raises(UsageError, match="exists already"):
+        write_programme(programme, str(path))
     assert 'temperature = "35 degC"' in path.read_text(encoding="utf-8")
     assert read_programme(path).step[0].temperature == 35.0
     path.write_text(path.read_text(encoding="utf-8").replace("ask =", "hold = '1 s' #"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from winchkit.errors import UsageError
-from winchkit.runs.files import refuse_existing
+from winchkit.regular_file import refuse_existing
 from winchkit.web.words import free_path, page_text
 
 

@@ -17,7 +17,7 @@ from winchkit.schema.read import read_bench
 def open_bench(
     bench: str | Path | BenchSpec,
     clock: Clock | None = None,
-    effects: Iterable[str | Path] = (),
+    effect_files: Iterable[str | Path] = (),
     *,
     name: str = "",
     realtime: Request = False,
@@ -33,7 +33,7 @@ def open_bench(
         A bench file, or what it declares.
     clock
         The computer's monotonic clock by default; a ``SimulatedClock`` for simulated time.
-    effects
+    effect_files
         Python files with effects of your own that its profiles have, besides those that the bench
         file names.
     name
@@ -61,7 +61,7 @@ def open_bench(
     spec = bench if isinstance(bench, BenchSpec) else read_bench(path_of(bench, "bench"))
     spec.require_winches()
     return Bench(
-        spec.with_effects(effects),
+        spec.with_effects(effect_files),
         clock or MonotonicClock(),
         name,
         serve=StationServer,

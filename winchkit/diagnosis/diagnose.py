@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import overload
 
+from winchkit.arguments import ProgressCallback, no_progress
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.data.sanity import caveats, unrelated
@@ -29,8 +30,6 @@ from winchkit.diagnosis.residuals.findings import findings
 from winchkit.diagnosis.residuals.traces import OutputTrace, trace_columns, traces_of
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, NextRun, OutputFit, Step
 from winchkit.diagnosis.search import (
-    ProgressCallback,
-    no_progress,
     search,
     selection_engine,
 )

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from winchkit.arguments import path_of, require_type, require_types
+from winchkit.arguments import ProgressCallback, no_progress, path_of, require_type, require_types
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import check_own, write_own, write_wave_on_drum
 from winchkit.effects.empirical import EMPIRICAL, LINEAR_IDS

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from winchkit.arguments import ProgressCallback
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.requirements import with_inputs
@@ -43,8 +44,6 @@ from winchkit.effects.location import located
 from winchkit.effects.transition import with_transitions
 
 Found = TypeVar("Found")
-ProgressCallback = Callable[[str, float], None]
-"""Called with the present step and the share of the work done, 0 to 1."""
 
 _USUAL_TRIALS = 7.0
 """Candidates after whose fits the progress bar has covered 63 % of a step; measured: a search of
@@ -54,10 +53,6 @@ _SEARCH = (0.4, 0.8)
 of the processor time and ends at 79 to 86 %."""
 _NAMING = (0.8, 1.0)
 """The same for the equivalence sets; measured: the rest."""
-
-
-def no_progress(what: str, share: float) -> None:
-    """Progress callback that does nothing."""
 
 
 def selection_engine(

@@ -19,7 +19,7 @@ def write_addition(
     source: str | Path,
     addition: Addition,
     runs: Sequence[str],
-    out: str | Path,
+    path: str | Path,
     *,
     replace: bool = False,
 ) -> None:
@@ -27,7 +27,7 @@ def write_addition(
 
     Parameters
     ----------
-    source, out : str or Path
+    source, path : str or Path
         The profile file, and its copy.
     addition : Addition
         Result of ``add``.
@@ -46,7 +46,7 @@ def write_addition(
     require_type(addition, Addition, "addition")
     require_types(runs, str, "runs")
     fitted, judged = _provenance(addition.terms, addition.outputs, runs)
-    write_fitted(path_of(source, "source"), fitted, path_of(out, "out"), judged, replace=replace)
+    write_fitted(path_of(source, "source"), fitted, path_of(path), judged, replace=replace)
 
 
 def write_removal(
@@ -54,7 +54,7 @@ def write_removal(
     effect: str,
     removal: Removal | None,
     runs: Sequence[str],
-    out: str | Path,
+    path: str | Path,
     *,
     replace: bool = False,
 ) -> None:
@@ -62,7 +62,7 @@ def write_removal(
 
     Parameters
     ----------
-    source, out : str or Path
+    source, path : str or Path
         The profile file, and its copy.
     effect : str
         Name of the effect.
@@ -85,9 +85,7 @@ def write_removal(
     require_types(runs, str, "runs")
     terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
     fitted, judged = _provenance(terms, outputs, runs)
-    write_without(
-        path_of(source, "source"), effect, fitted, path_of(out, "out"), judged, replace=replace
-    )
+    write_without(path_of(source, "source"), effect, fitted, path_of(path), judged, replace=replace)
 
 
 def _provenance(

@@ -10,8 +10,7 @@ from tomlkit.exceptions import ParseError
 from tomlkit.items import AoT
 
 from winchkit.errors import Fault, FileError
-from winchkit.regular_file import file_errors, read_text
-from winchkit.runs.files import refuse_existing
+from winchkit.regular_file import file_errors, read_text, refuse_existing
 from winchkit.schema.profiles.winch import SHORTHANDS
 from winchkit.units import format_quantity
 

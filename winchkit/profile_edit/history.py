@@ -35,7 +35,7 @@ class HistoryStep:
         return {**asdict(self), "date": self.date.isoformat(), "runs": list(self.runs)}
 
 
-def ladder(profile: WinchProfile | RobotProfile) -> tuple[HistoryStep, ...]:
+def ledger(profile: WinchProfile | RobotProfile) -> tuple[HistoryStep, ...]:
     """Return every step of a profile's ledger, oldest first; raises FileError for a wrong quantity.
 
     Parameters

@@ -56,12 +56,12 @@ def note(document: Any, did: Literal["add", "remove"], effect_id: str, judged: J
     tables(document, "ledger").append(entry)
 
 
-def undo(source: str | Path, out: str | Path, *, replace: bool = False) -> str:
+def undo(source: str | Path, path: str | Path, *, replace: bool = False) -> str:
     """Copy a profile without its last step.
 
     Parameters
     ----------
-    source, out : str or Path
+    source, path : str or Path
         The profile, and its copy.
     replace : bool
         Write over another profile that exists; over ``source`` always.
@@ -78,8 +78,8 @@ def undo(source: str | Path, out: str | Path, *, replace: bool = False) -> str:
     UsageError
         For a file that is not to be replaced.
     """
-    source, out = path_of(source, "source"), path_of(out, "out")
-    refuse_other(source, out, replace)
+    source, path = path_of(source, "source"), path_of(path)
+    refuse_other(source, path, replace)
     document = read_document(source)
     steps = tables(document, "ledger")
     if not len(steps):
@@ -93,7 +93,7 @@ def undo(source: str | Path, out: str | Path, *, replace: bool = False) -> str:
         document[part][name] = value
     del steps[len(steps) - 1]
     _replace(document, effects)
-    write_document(document, out)
+    write_document(document, path)
     return f"{last['did']} {last['effect']}"
 
 

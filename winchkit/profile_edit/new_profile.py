@@ -19,7 +19,7 @@ from winchkit.profile_edit.drawing import (
     Field,
     asked,
 )
-from winchkit.runs.files import refuse_existing
+from winchkit.regular_file import refuse_existing
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.reading.source import TomlSource
 from winchkit.schema.reading.tables import marker_at, read_table, type_at

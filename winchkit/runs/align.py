@@ -37,7 +37,7 @@ def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Ar
     return found
 
 
-def patience_of(source: SignalSource) -> float:
+def longest_wait(source: SignalSource) -> float:
     """Time without a sample after which a source counts as silent, s."""
     return max(PATIENCE, source.max_gap)
 
@@ -48,7 +48,7 @@ class Moments:
     def __init__(self, layout: Layout) -> None:
         self._rule = layout.rule
         base = next(source for source in layout.sources if source.topic == self._rule.topic)
-        self._patience = patience_of(base)
+        self._wait = longest_wait(base)
         self._last = -np.inf
         self._picked: Array = np.empty(0)
         """Samples of the source that are not taken yet."""
@@ -76,7 +76,7 @@ class Moments:
         found: list[Array] = []
         while len(self._picked):
             awaited = self._awaited
-            apart = np.diff(self._picked, prepend=min(awaited, self._picked[0])) > self._patience
+            apart = np.diff(self._picked, prepend=min(awaited, self._picked[0])) > self._wait
             near = int(np.argmax(apart)) if apart.any() else len(apart)
             if near:
                 found.append(self._kept(self._picked[:near]))
@@ -88,7 +88,7 @@ class Moments:
                 self._picked = self._picked[1:]
             else:
                 break
-        if not len(self._picked) and known - self._awaited > self._patience:
+        if not len(self._picked) and known - self._awaited > self._wait:
             found.append(self._between(self._awaited, known, inclusive=True))
         self._others = self._others[self._others > self._awaited]
         return np.concatenate([np.empty(0), *found])

@@ -8,8 +8,7 @@ from pathlib import Path
 from winchkit.arguments import path_of, require_types
 from winchkit.errors import RunError, UsageError
 from winchkit.extras import library
-from winchkit.regular_file import file_errors
-from winchkit.runs.files import refuse_existing
+from winchkit.regular_file import file_errors, refuse_existing
 from winchkit.runs.log import Log, aligned, log_of_run
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
@@ -53,15 +52,15 @@ FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
 
 
 def export(
-    paths: Sequence[str | Path], output: str | Path, winch: str = "", *, replace: bool = False
+    sources: Sequence[str | Path], path: str | Path, winch: str = "", *, replace: bool = False
 ) -> Run:
     """Write a run, or the parts of a log, to one file.
 
     Parameters
     ----------
-    paths : sequence of str or Path
+    sources : sequence of str or Path
         The run, or the parts of a log.
-    output : str or Path
+    path : str or Path
         File; its suffix is the format. MF4 keeps the time stamps of every source, the other formats
         have rows.
     winch : str
@@ -80,21 +79,21 @@ def export(
         For an invalid run, a file that cannot be written, an unknown suffix, and an output that
         exists and is not to be replaced.
     """
-    require_types(paths, (str, Path), "paths")
-    if not paths:
+    require_types(sources, (str, Path), "sources")
+    if not sources:
         raise RunError("no log given")
-    suffix = path_of(output, "output").suffix.lower()
+    suffix = path_of(path).suffix.lower()
     if suffix not in FORMATS:
-        raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
-    if any(Path(path).resolve() == Path(output).resolve() for path in paths):
-        raise UsageError(f"{output}: would replace the file that is exported; name another")
-    refuse_existing(Path(output), replace)
-    log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
-    run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
+        raise UsageError(f"{path}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
+    if any(Path(source).resolve() == Path(path).resolve() for source in sources):
+        raise UsageError(f"{path}: would replace the file that is exported; name another")
+    refuse_existing(Path(path), replace)
+    log = None if len(sources) == 1 and suffix != ".mf4" else read_log(sources)
+    run = (read_run(sources[0]) if log is None else aligned(log)).of_winch(winch)
     if log is not None and suffix == ".mf4":
-        write_mf4(log_of_run(run) if winch else log, output)
+        write_mf4(log_of_run(run) if winch else log, path)
     elif suffix == ".parquet":
-        write_parquet(run, output)
+        write_parquet(run, path)
     else:
-        write_run(run, output, replace=True)
+        write_run(run, path, replace=True)
     return run

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError
 from winchkit.runs.recording.log_file import refuse_written
 
 
@@ -37,12 +37,3 @@ def abandoned(stream: BinaryIO, path: Path, whole: int, error: OSError) -> FileE
 
 def _refused(path: Path, error: OSError) -> FileError:
     return FileError(Fault(f"cannot be written: {error.strerror}", str(path)))
-
-
-def refuse_existing(target: Path, replace: bool) -> None:
-    """Raise UsageError where ``target`` exists and is not to be replaced."""
-    if target.exists() and not replace:
-        raise UsageError(
-            f"{target} exists already; name another file, or write over it "
-            "(--replace, in Python replace=True)"
-        )

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, RunError, UsageError
-from winchkit.runs.files import refuse_existing, write_whole
+from winchkit.regular_file import refuse_existing
+from winchkit.runs.files import write_whole
 from winchkit.runs.formats.csv_read import read_bytes
 from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, PROFILE, McapFile
 from winchkit.runs.formats.mcap_read import read_content
@@ -57,7 +58,7 @@ def recovered_path(path: Path) -> Path:
 
 
 def recover(
-    path: str | Path, output: str | Path | None = None, *, replace: bool = False
+    source: str | Path, path: str | Path | None = None, *, replace: bool = False
 ) -> Recovered:
     """Write the complete records of a file to another, complete one.
 
@@ -66,9 +67,9 @@ def recover(
 
     Parameters
     ----------
-    path : str or Path
+    source : str or Path
         MCAP or CSV file of winchkit, cut off at any position or damaged.
-    output : str or Path, optional
+    path : str or Path, optional
         By default ``lift.recovered.mcap`` for ``lift.mcap``.
     replace : bool
         Write over a file of that name.
@@ -87,8 +88,8 @@ def recover(
     UsageError
         Where the output is the file itself, or exists and is not to be replaced.
     """
-    source = path_of(path)
-    target = path_of(output, "output") if output else recovered_path(source)
+    source = path_of(source, "source")
+    target = path_of(path) if path else recovered_path(source)
     suffix = source.suffix.lower()
     if target.resolve() == source.resolve():
         raise UsageError(f"{target}: would replace the file that is to be recovered; name another")

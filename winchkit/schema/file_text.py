@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from winchkit.schema.profiles.winch import EffectTable
 from winchkit.schema.quantity import Quantity
 from winchkit.units import UNITS, format_quantity, is_bare
 
@@ -32,6 +33,8 @@ def _table(declared: Any) -> dict[str, Any]:
 
 
 def _value(value: Any, marker: object) -> Any:
+    if isinstance(value, EffectTable):
+        return {"id": value.id, **value.values}
     if is_dataclass(value):
         return _table(value)
     if isinstance(value, tuple):

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
-from winchkit.arguments import require_type
-from winchkit.regular_file import file_errors
-from winchkit.schema.file_text import file_text
 from winchkit.schema.quantity import (
     Length,
     PositiveAcceleration,
@@ -123,19 +119,3 @@ class Programme(Table):
         """A programme has at least one step."""
         if not self.step:
             yield "step", "a programme needs at least one [[step]]"
-
-
-def write_programme(programme: Programme, path: Path) -> None:
-    """Write a programme file; raises FileError.
-
-    Parameters
-    ----------
-    programme : Programme
-        The programme.
-    path : Path
-        The file.
-    """
-    require_type(programme, Programme, "programme")
-    text = file_text("programme", programme)
-    with file_errors(path):
-        path.write_text(text, encoding="utf-8")

@@ -15,6 +15,7 @@ from winchkit.runs.run import Run
 TIME = "time"
 """In place of a channel: time since the start of the run, s."""
 _POINTS = 1600
+"""Of all runs together: about one per pixel of a wide plot."""
 
 
 def lines_of(runs: Iterable[tuple[str, Run]], channel: str, over: str = TIME) -> dict[str, Any]:

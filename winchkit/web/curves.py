@@ -44,6 +44,7 @@ _BINS = (20, 100)
 300 px."""
 _DIGITS = 5
 _TIME_DIGITS = 7
+"""Significant digits of values, finer than a pixel, and of times: a millisecond of an hour."""
 
 Indices = NDArray[np.intp]
 

@@ -21,7 +21,9 @@ from winchkit.units import parse
 from winchkit.web.words import page_text
 
 _FIRST = 5
+"""Rows of a column that the dialog shows."""
 _POINTS = 120
+"""Of a column's small plot."""
 
 
 def is_run(path: Path) -> bool:

@@ -29,15 +29,15 @@ _CANCELLED = 0.3
 
 
 def serve(
-    runs: Sequence[str] = (),
-    profile: str | None = None,
+    runs: Sequence[str | Path] = (),
+    profile: str | Path | None = None,
     *,
     port: int = 0,
     folder: str | Path = ".",
-    bench: str | None = None,
-    sim: str | None = None,
+    bench: str | Path | None = None,
+    sim: str | Path | None = None,
     allow_motion: bool = False,
-    effects: Sequence[str] = (),
+    effect_files: Sequence[str | Path] = (),
     mystery: int | None = None,
     ready: Callable[[str], None] = print,
 ) -> None:
@@ -45,21 +45,21 @@ def serve(
 
     Parameters
     ----------
-    runs : sequence of str
+    runs : sequence of str or Path
         Run files to open.
-    profile : str, optional
+    profile : str or Path, optional
         Profile to open, a name or a file.
     port : int
         0 for a free one.
     folder : str or Path
         Whose runs the Library view lists.
-    bench : str, optional
+    bench : str or Path, optional
         A bench file to attach to.
-    sim : str, optional
+    sim : str or Path, optional
         A simulated bench to start and attach to.
     allow_motion : bool
         Whether the page may move the bench.
-    effects : sequence of str
+    effect_files : sequence of str or Path
         Files with effects of the user's own.
     mystery : int, optional
         Seed of a simulated bench with a hidden effect, whose runs are opened.
@@ -71,7 +71,8 @@ def serve(
     UsageError
         Where the port is in use, or the extra ``web`` is not installed.
     """
-    require_types(runs, str, "runs")
+    require_types(runs, (str, Path), "runs")
+    require_types(effect_files, (str, Path), "effect_files")
     folder = path_of(folder, "folder")
     try:
         import uvicorn
@@ -84,6 +85,8 @@ def serve(
     from winchkit.web.views import views_of
     from winchkit.web.workspace import DiagnoseView
 
+    effects = [str(file) for file in effect_files]
+    named = None if profile is None else str(path_of(profile, "profile"))
     token = secrets.token_urlsafe(24)
     with ExitStack() as stack:
         own_folder = TemporaryDirectory(prefix="winchkit-page-", ignore_cleanup_errors=True)
@@ -96,18 +99,18 @@ def serve(
             from winchkit.web.server import simulated_bench
 
             if sim is not None:
-                bench = stack.enter_context(simulated_bench(sim, own))
+                bench = stack.enter_context(simulated_bench(str(sim), own))
             assert bench is not None
             view = stack.enter_context(
-                BenchView(bench, effects, allow_motion=allow_motion, folder=own)
+                BenchView(str(bench), effects, allow_motion=allow_motion, folder=own)
             )
         views = views_of(workspace, folder)
         app = application(workspace, token, views, view)
-        shown = next((one for one in views if profile and one.is_profile(profile)), None)
+        shown = next((one for one in views if named and one.is_profile(named)), None)
         if mystery is not None:
             workspace.mystery(mystery)
-        elif runs or profile:
-            (shown or workspace).open(runs, profile)
+        elif runs or named:
+            (shown or workspace).open([str(run) for run in runs], named)
         if view is not None and view.robot_profile and shown is None:
             for one in views:
                 if one.is_profile(view.robot_profile):

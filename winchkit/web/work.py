@@ -181,13 +181,14 @@ class DiagnoseWork:
             self._work = None
             self.changed()
 
-    def progress(self, what: str, share: float) -> None:
+    def progress(self, what: str, share: float | None) -> None:
         """Report the progress; raises Cancelled where the user ended it."""
         work = self._work
         if work is None:
             return
         if work.cancelled.is_set():
             raise Cancelled
+        share = work.share if share is None else share
         if what != work.what or share - work.share > 0.01:
             work.what, work.share = what, share
             self.changed()

@@ -18,8 +18,8 @@ from winchkit.errors import UsageError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
 from winchkit.report.words.sentence import capital, plan_texts
 from winchkit.report.words.vocabulary import effect_name, listed
-from winchkit.schema.programme import write_programme
 from winchkit.schema.read import read_profile
+from winchkit.schema.write import write_programme
 from winchkit.web.candidate import candidate_card, pattern
 from winchkit.web.curves import OutputCurves
 from winchkit.web.work import NO_NAME, DiagnoseWork, StoredRun

@@ -179,7 +179,7 @@ def test_a_winch_ends_where_the_own_effect_says(tmp_path: Path) -> None:
         with LiveBench(soft, simulated_time=clock) as live:
             wired = replace(live.bench_spec.winch["A"], profile=str(profile))
             spec = replace(live.bench_spec, winch={"A": wired})
-            with open_bench(spec, clock, effects=files) as bench:
+            with open_bench(spec, clock, effect_files=files) as bench:
                 bench.winch["A"].move_to(3.0, speed=0.4)
                 with live.up_to_date():
                     missed[name] = live.winches["A"].plant.cable_length - 3.0

@@ -58,6 +58,8 @@ def test_settings_are_saved_compared_and_loaded(bench: Served, tmp_path: Path) -
     objects.put(0x6085, 0, 123_456)
     path = tmp_path / "a.json"
     assert winchkit.config_save(bench.file, path, "A") == ()
+    with pytest.raises(UsageError, match="exists already"):
+        winchkit.config_save(bench.file, path, "A")
     assert winchkit.config_diff(bench.file, path, "A") == []
     objects.put(0x6085, 0, 99)
     (found,) = winchkit.config_diff(bench.file, path, "A")

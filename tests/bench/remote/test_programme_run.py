@@ -15,8 +15,9 @@ from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.runs import read_run
-from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
+from winchkit.schema.write import write_programme
 from winchkit.testing.opened import OpenedBench
 
 SPEED = 0.4
@@ -49,7 +50,7 @@ class Rig:
 
     def start(self, folder: Path, *steps: ProgrammeStep) -> None:
         path = folder / "own.toml"
-        write_programme(Programme("own", steps), path)
+        write_programme(Programme("own", steps), path, replace=True)
         self.station.start_programme(str(path), str(folder / "runs"))
 
     @property

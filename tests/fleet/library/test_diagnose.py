@@ -411,7 +411,7 @@ def test_processes_with_a_user_effect_give_the_rows_of_the_plain_loop_byte_for_b
     found = []
     for jobs in (1, 2):
         folder = tmp_path / str(jobs)
-        report = diagnose_library(folder, profile, effects=[tmp_path / "own.py"], jobs=jobs)
+        report = diagnose_library(folder, profile, effect_files=[tmp_path / "own.py"], jobs=jobs)
         assert (report.diagnosed, dict(report.failures)) == (4, {})
         tables = [Partitions(folder).read(table) for table in ("diagnoses", "estimates")]
         found.append([sorted(map(repr, table.to_pylist())) for table in tables])

@@ -17,8 +17,9 @@ from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.robot import Pose, Robot, lengths, robot_of, rotation_of
 from winchkit.robot.calibration import pose_design as robot_next
-from winchkit.robot.calibration.calibrate import calibrate, split
+from winchkit.robot.calibration.calibrate import Calibrated, calibrate, split
 from winchkit.robot.calibration.options import Options
+from winchkit.robot.calibration.outliers import unexplained
 from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.forces.balance import (
@@ -325,7 +326,8 @@ def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
 
 
 @pytest.mark.slow
-def test_inverted_swivel_encoders_are_refused() -> None:
+@pytest.mark.campaign
+def test_a_fit_to_inverted_swivel_encoders_is_refused() -> None:
     """As the directions of the pulleys of a real robot were: a noise of 20 degrees was fitted."""
     nominal, measured = without_tracker(14, 7)
     found = calibrate(nominal, *split(replace(measured, swivel=-measured.swivel)))
@@ -333,9 +335,9 @@ def test_inverted_swivel_encoders_are_refused() -> None:
     assert "swivel_axis" in found.refusal
 
 
-@pytest.mark.slow
-def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
-    """A robot that is switched on anywhere: its home is declared 50 mm beside the true one."""
+@cache
+def with_unknown_home() -> tuple[Robot, Array, Calibrated]:
+    """A robot that is switched on anywhere, the change of its lengths to there, and its fit."""
     nominal, measured = without_tracker(30, 8)
     profile, away = nominal.profile, np.array([0.03, -0.03, 0.03])
     declared = np.array(profile.home.position) + away
@@ -347,7 +349,25 @@ def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
     )
     found = calibrate(robot_of(unknown), *split(measured), Options(effects=("home-length",)))
     home = np.array([*profile.home.position, *profile.home.rotation])
-    moved = ropes(home) - ropes(np.array([x, y, z, *profile.home.rotation]))
+    return nominal, ropes(home) - ropes(np.array([x, y, z, *profile.home.rotation])), found
+
+
+@pytest.mark.slow
+def test_swivel_encoders_against_a_geometry_that_they_do_not_follow_are_refused() -> None:
+    """The whole fit to such encoders is a campaign; reversed axes are in test_swivel_axes.py."""
+    found = with_unknown_home()[2]
+    measured = found.equations.measured
+    assert not list(unexplained(found.equations, found.solution))
+    inverted = replace(found.equations, measured=replace(measured, swivel=-measured.swivel))
+    refused = replace(found, unexplained=tuple(unexplained(inverted, found.solution))).refusal
+    assert "not calibrated: the swivel angles do not follow the geometry" in refused
+    assert "swivel_axis" in refused
+
+
+@pytest.mark.slow
+def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
+    """Its home is declared 50 mm beside the true one."""
+    nominal, moved, found = with_unknown_home()
     lengths_there = [found.estimates[f"{line}.home_length"] for line in nominal.names]
     assert np.max(np.abs(moved)) > 0.02
     assert [item.value for item in lengths_there] == pytest.approx(moved.tolist(), abs=3e-3)

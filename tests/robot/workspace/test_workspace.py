@@ -115,6 +115,8 @@ def test_a_surface_is_closed_and_can_be_read_back(tmp_path: Path, suffix: str) -
     assert all(edges[b, a] == count for (a, b), count in edges.items())
     path = tmp_path / f"shape{suffix}"
     write_mesh(mesh, path)
+    with pytest.raises(UsageError, match="exists already"):
+        write_mesh(mesh, path)
     lines = path.read_text(encoding="ascii").splitlines()
     if suffix == ".ply":
         lines = lines[lines.index("end_header") + 1 :]

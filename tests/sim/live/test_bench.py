@@ -85,6 +85,8 @@ def master(live: LiveBench) -> Iterator[Master]:
 
 def test_the_written_wiring_is_the_one_in_use(live: LiveBench, tmp_path: Path) -> None:
     path = live.write_bench_file(tmp_path / "a b.toml")
+    with pytest.raises(UsageError, match="exists already"):
+        live.write_bench_file(path)
     read = read_bench(path)
     assert read == replace(live.bench_spec, path=read.path)
     assert read.bus["instruments"].port != 5020

@@ -25,8 +25,9 @@ from winchkit.catalog import find
 from winchkit.errors import FileError, NotPermitted, UsageError, WinchkitError
 from winchkit.runs.read import read_run
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.programme import Programme, ProgrammeStep, write_programme
+from winchkit.schema.programme import Programme, ProgrammeStep
 from winchkit.schema.read import read_simbench
+from winchkit.schema.write import write_programme
 from winchkit.web.application import _refused
 from winchkit.web.bench.browser import Browser, Inbox
 from winchkit.web.bench.drive_objects import (

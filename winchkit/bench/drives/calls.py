@@ -34,6 +34,7 @@ from winchkit.drivers.can.tools.config import (
 from winchkit.drivers.can.tools.info import DriveInfo, read_info
 from winchkit.drivers.can.tools.scan import ScannedNode
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.regular_file import refuse_existing
 from winchkit.schema.bench import BenchSpec, WinchWiring
 from winchkit.schema.devices.servo import PdoSpec
 from winchkit.schema.read import read_bench
@@ -150,7 +151,9 @@ def drive_info(bench: Wiring, who: str | None = None, *, device: str | None = No
         return read_info(node.objects)
 
 
-def config_save(bench: Wiring, path: str | Path, who: str | None = None) -> tuple[str, ...]:
+def config_save(
+    bench: Wiring, path: str | Path, who: str | None = None, *, replace: bool = False
+) -> tuple[str, ...]:
     """Read all settings of a drive into a file, ``.dcf`` or ``.json``.
 
     Parameters
@@ -159,15 +162,24 @@ def config_save(bench: Wiring, path: str | Path, who: str | None = None) -> tupl
         As of :func:`drive_info`, with its errors.
     path : str or Path
         File to write.
+    replace : bool
+        Write over an existing file.
 
     Returns
     -------
     tuple of str
         Settings that the drive refused to give, with the reason.
+
+    Raises
+    ------
+    UsageError
+        Where the file exists and is not to be replaced.
     """
+    path = path_of(path)
+    refuse_existing(path, replace)
     with drive_at(_spec(bench), who) as node:
         config = read_config(node.objects)
-        write_config_file(Path(path), config, node.eds, node.node, node.bitrate)
+        write_config_file(path, config, node.eds, node.node, node.bitrate)
     return tuple(config.refused)
 
 

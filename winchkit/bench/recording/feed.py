@@ -14,7 +14,7 @@ import numpy as np
 
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.drivers.reading import InstrumentReading, Sensor
-from winchkit.runs.align import patience_of
+from winchkit.runs.align import longest_wait
 from winchkit.runs.layout import Layout, RowRule, SignalSource, SourceSamples, SourceSignal
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class Silences:
 
     def __init__(self, layout: Layout) -> None:
         """Every source is awaited from the beginning of the log on."""
-        self._longest = {source.topic: patience_of(source) for source in layout.sources}
+        self._longest = {source.topic: longest_wait(source) for source in layout.sources}
         self._last = dict.fromkeys(self._longest, layout.rule.opened)
         self._silences = {topic: _Silence() for topic in self._longest}
 

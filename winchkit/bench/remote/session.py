@@ -30,7 +30,11 @@ _POLL = 0.05
 
 
 def attach(
-    bench: str | Path, effects: Sequence[str | Path] = (), *, name: str = "", observer: bool = False
+    bench: str | Path,
+    effect_files: Sequence[str | Path] = (),
+    *,
+    name: str = "",
+    observer: bool = False,
 ) -> RemoteStation:
     """Take part in a bench that another process owns; start a bench process where there is none.
 
@@ -40,7 +44,7 @@ def attach(
     ----------
     bench
         A bench file.
-    effects
+    effect_files
         Python files with effects of your own that its profiles have.
     name
         What other clients see of this program; its file and process by default.
@@ -64,7 +68,7 @@ def attach(
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)
-    files = [str(file) for file in effects]
+    files = [str(file) for file in effect_files]
     station = _attached(spec, files, name or client_name(), observer=observer)
     if station is None:
         raise NotPermitted(
@@ -101,7 +105,7 @@ def at_station(
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
 
-    with open_bench(spec, effects=effects, name=name, realtime="try") as opened:
+    with open_bench(spec, None, effects, name=name, realtime="try") as opened:
         station = LocalStation(opened, Client(name, observer=observer))
         try:
             yield station

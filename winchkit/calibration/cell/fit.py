@@ -34,6 +34,7 @@ _FOLLOWS = 5.0
 _FAR = 3.0
 """Residual of an outlying point in standard deviations."""
 _ITERATIONS = 50
+"""At most, where rounding keeps the change above _CONVERGED."""
 _CONVERGED = 1e-12
 """Relative change of the coefficients at which the iteration ends: rounding."""
 _SAME_LOAD = 1e-3

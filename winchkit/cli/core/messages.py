@@ -126,11 +126,11 @@ def _show_log(ctx: click.Context) -> None:
     """Show what winchkit logs of its steps, until the command ends."""
     import logging
 
-    class Shown(logging.Handler):
+    class Details(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             detail(record.getMessage())
 
-    logger, handler = logging.getLogger("winchkit"), Shown(logging.INFO)
+    logger, handler = logging.getLogger("winchkit"), Details(logging.INFO)
     before = logger.level
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)

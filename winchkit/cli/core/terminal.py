@@ -11,12 +11,13 @@ import io
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import click
 
+from winchkit.arguments import ProgressCallback
 from winchkit.cli.core.messages import detail, is_quiet, is_verbose
 from winchkit.errors import one_line, printable
 
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from winchkit.bench.recording.live_sinks import LiveSink
-
-ProgressCallback = Callable[[str, float | None], None]
-"""Called with the present task and the share that is done; None where that is not known."""
 
 
 class EscapedStream:

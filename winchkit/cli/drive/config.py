@@ -62,7 +62,7 @@ def save(who: str, *, output: Path, replace: bool, **bus: Any) -> None:
     """Read every setting of a drive into a file."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import read_config, write_config_file
-    from winchkit.runs.files import refuse_existing
+    from winchkit.regular_file import refuse_existing
 
     check_output(output, _FORMATS)
     refuse_existing(output, replace)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, get_args
 import click
 
 from winchkit import wings
-from winchkit.arguments import require_type
+from winchkit.arguments import require_type, require_types
 from winchkit.catalog import Kind, find, names
 from winchkit.cli.core.command import ToolCommand
 from winchkit.cli.core.options import TABLE, effects_option
@@ -98,14 +98,14 @@ def command(
     ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
 
 
-def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
+def check(file: str | Path, effect_files: Sequence[str | Path] = ()) -> Verdict:
     """Read a file of any kind and list its faults.
 
     Parameters
     ----------
     file : str or Path
         Declaration (.toml, or the name of a shipped one), run (.csv, .mcap), EDS, DCF, XDD or XDC.
-    effects : sequence of str
+    effect_files : sequence of str or Path
         Python files with effects of your own that a profile has.
 
     Returns
@@ -114,6 +114,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         Kind, name, faults and warnings; ``ok`` where the file can be used.
     """
     require_type(file, (str, Path), "file")
+    require_types(effect_files, (str, Path), "effect_files")
     file = _of_name(str(file))
     suffix = Path(file).suffix.lower()
     try:
@@ -122,7 +123,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         if suffix in (*SUFFIXES, _XML):
             return _eds(file)
         if suffix == ".toml" or not Path(file).is_file():
-            return _declaration(file, effects)
+            return _declaration(file, [str(each) for each in effect_files])
         known = ", ".join((".toml", *SUFFIXES, *RUNS))
         from winchkit.can_trace import trace_advice
 

@@ -68,8 +68,7 @@ def command(
     from winchkit.cli.model.options import declared_profile
     from winchkit.dynamics.export import export_model
     from winchkit.effects import load_catalogue
-    from winchkit.regular_file import file_errors
-    from winchkit.runs.files import refuse_existing
+    from winchkit.regular_file import file_errors, refuse_existing
 
     if output is not None:
         refuse_existing(Path(output), replace)

@@ -31,7 +31,7 @@ def targets_in(
     files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: bool
 ) -> list[Path]:
     """File of each run; raises UsageError rather than write over a recording."""
-    from winchkit.runs.files import refuse_existing
+    from winchkit.regular_file import refuse_existing
 
     stems: list[str] = []
     for file in files:
@@ -54,7 +54,7 @@ def targets_of(
     results: Sequence[tuple[int, Run]], targets: Sequence[Path], *, overwrite: bool
 ) -> list[Path]:
     """File of each run; pieces of one recording have ``-piece1`` and so on behind its name."""
-    from winchkit.runs.files import refuse_existing
+    from winchkit.regular_file import refuse_existing
 
     found = []
     for index, run in results:

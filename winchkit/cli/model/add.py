@@ -168,15 +168,15 @@ def _tell(output: str, data: dict[str, Any], fitted: Addition | Removal | None) 
 @html_option
 def ledger(profile: str, html: str | None) -> None:
     """List every effect that was added to or removed from a profile, and the errors then."""
-    from winchkit.profile_edit.history import ladder
+    from winchkit.profile_edit import history
     from winchkit.report.pages.history import ladder_html, ladder_text
 
     declared = declared_profile(find("profiles", profile))
-    rungs = ladder(declared)
-    steps = [rung.to_json() for rung in rungs]
-    tell({"profile": declared.name, "steps": steps}, [ladder_text(declared.name, rungs)])
+    steps = history.ledger(declared)
+    told = {"profile": declared.name, "steps": [step.to_json() for step in steps]}
+    tell(told, [ladder_text(declared.name, steps)])
     if html:
-        write_page(html, ladder_html(declared.name, rungs))
+        write_page(html, ladder_html(declared.name, steps))
 
 
 @click.command(

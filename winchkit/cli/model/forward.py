@@ -70,8 +70,8 @@ def command(
     from winchkit.cli.core.quantities import check_typed, quantity
     from winchkit.dynamics.forward import forward
     from winchkit.effects import load_catalogue
+    from winchkit.regular_file import refuse_existing
     from winchkit.runs import read_run, write_run
-    from winchkit.runs.files import refuse_existing
     from winchkit.runs.info import summary_of
     from winchkit.schema.read import read_profile, read_programme
     from winchkit.sim.bench import programme_path

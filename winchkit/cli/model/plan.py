@@ -69,7 +69,7 @@ def command(
     """
     from winchkit import wings
     from winchkit.diagnosis.profiles import require_winch
-    from winchkit.runs.files import refuse_existing
+    from winchkit.regular_file import refuse_existing
 
     declared = declared_profile(asked.source)
     if output is not None:
@@ -92,11 +92,11 @@ def _plan_winch(
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.regular_file import refuse_existing
     from winchkit.report.words.columns import paragraph
     from winchkit.report.words.sentence import plan_texts
-    from winchkit.runs.files import refuse_existing
     from winchkit.schema.profiles.axis import AxisProfile
-    from winchkit.schema.programme import write_programme
+    from winchkit.schema.write import write_programme
 
     if isinstance(declared, AxisProfile):
         raise UsageError(
@@ -124,7 +124,7 @@ def _plan_winch(
         words = () if bench is None else ("-b", bench)
         suggest_with("plan", asked, runs, *words, "-o", "next.toml")
         return
-    write_programme(found.programme(path.stem), path)
+    write_programme(found.programme(path.stem), path, replace=True)
     note(f"written: {path}, the first of the list: {found.offers[0].kind.name}")
     suggest_run(path, bench)
 

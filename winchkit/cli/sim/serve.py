@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _CHECK_EVERY = 0.1
 """s between two looks at the simulation; it delays the end of the command only."""
 _TURN = 1e-4
+"""s: longest turn of a thread of the interpreter, a fortieth of a cycle of 4 ms."""
 _DETERMINED = 6
 """Cables from which they determine the pose of a platform, so that it can be moved as one."""
 
@@ -95,7 +96,7 @@ def command(
     _refuse_to_replace(path)
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
-        live.write_bench_file(path)
+        live.write_bench_file(path, replace=True)
         with (
             ControlServer(live, path, ended.set),
             _ended_by_signals(ended),

@@ -91,7 +91,7 @@ def command(
             bench=bench,
             sim=simulated,
             allow_motion=allow_motion or simulated is not None,
-            effects=effect_files,
+            effect_files=effect_files,
             mystery=mystery,
             ready=lambda url: _ready(url, browser=not no_browser),
         )

@@ -26,8 +26,6 @@ _WINDOW = 25
 class RoundingError:
     """Error of an output by the rounding of one instrument."""
 
-    instrument: str
-    """Channel that is rounded; the zero of its steps is the same in all runs."""
     components: Array
     """Cosine, then sine components of the mean error's harmonics, (2 × harmonics, n)."""
     white: float
@@ -71,7 +69,7 @@ def rounding_errors(
             rest = np.nan_to_num(recording.measured[output] - predicted)
             change = uniform_filter1d(rest, _WINDOW, mode="nearest")
         signal = predicted + change
-        yield RoundingError(output, *mean_error(signal, resolution[output], noise[output]))
+        yield RoundingError(*mean_error(signal, resolution[output], noise[output]))
     motion = recording.smooth
     name = "tension" if motion.load is None else "load"
     if name not in noise or output == "cable_length":
@@ -80,7 +78,7 @@ def rounding_errors(
     changed = Line(dataset.profile).predict(_with_force(motion, step))[output]
     by_force = (changed - predicted) / step
     components, _ = mean_error(_force(motion), step, noise[name])
-    yield RoundingError(name, by_force * components, 0.0)
+    yield RoundingError(by_force * components, 0.0)
 
 
 def _measured_and_signal(recording: Recording, name: str) -> tuple[Array, Array] | None:

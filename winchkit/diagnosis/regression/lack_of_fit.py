@@ -29,8 +29,6 @@ class LackOfFitTest:
 
     p_value: float
     """Smallest p-value of a band times the number of bands (Bonferroni); NaN without repeats."""
-    excess_power: Array
-    """Residual sum of squares beyond its expectation over the noise variance, (n_bands,)."""
     rejected: NDArray[np.bool_]
     """Bands whose corrected p-value is below 5 %, (n_bands,)."""
 
@@ -46,12 +44,11 @@ def lack_of_fit_test(
     """
     count = len(regression.bands)
     if not noise.from_repeats:
-        nothing = np.zeros(count)
-        return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
-    total, dof, p = _tested_means(regression, residual, jacobian, noise)
+        return LackOfFitTest(float("nan"), np.zeros(count, bool))
+    _, _, p = _tested_means(regression, residual, jacobian, noise)
     tested = max(count, 1)
     worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return LackOfFitTest(worst, total / noise.power - dof, p * tested < BAND_LEVEL)
+    return LackOfFitTest(worst, p * tested < BAND_LEVEL)
 
 
 def output_p_values(

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import (
     AT_NOISE,
     excess,
@@ -195,12 +194,11 @@ def output_fits(
     engine: TimeSeriesSelection,
     initial_model: tuple[Fit, BandNoise],
     final: tuple[Fit, BandNoise],
-    folds: Folds | None = None,
 ) -> dict[str, OutputFit]:
     """Errors of every output before and after, in sample and held out, with its noise; rms in SI.
-    By default the folds are those of the final fit.
+    The folds are those of the final fit.
     """
-    regression, folds = engine.regression, folds or engine.folds(*final)
+    regression, folds = engine.regression, engine.folds(*final)
     noise, leakage = final[1], StopBandLeakage(regression)
 
     def errors(model: tuple[Fit, BandNoise]) -> tuple[dict[str, float], ...]:

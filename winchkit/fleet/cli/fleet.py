@@ -75,7 +75,7 @@ def diagnose(
         report = diagnose_library(
             folder,
             profile,
-            effects=effect_files,
+            effect_files=effect_files,
             band=band,
             jobs=jobs,
             scheduler=scheduler,

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 
-from winchkit.arguments import require_each, require_type
+from winchkit.arguments import ProgressCallback, no_progress, require_each, require_type
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
-from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -63,8 +62,8 @@ def diagnose_each(
     shares = dict.fromkeys(winches, 0.0)
 
     def one(name: str) -> WinchAnswer:
-        def report_progress(what: str, share: float) -> None:
-            shares[name] = share
+        def report_progress(what: str, share: float | None) -> None:
+            shares[name] = share or shares[name]
             progress(f"{name}: {what}" if name else what, sum(shares.values()) / len(shares))
 
         answer = diagnose(

@@ -6,12 +6,13 @@ Paths go to a worker and rows of tables come back.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from winchkit.fleet.library.index import indexed, no_progress
+from winchkit.arguments import ProgressCallback, no_progress
+from winchkit.fleet.library.index import indexed
 from winchkit.fleet.library.partitions import Partitions, Row
 from winchkit.fleet.library.sessions import run_faults, winch_sessions
 from winchkit.fleet.library.tasks import Outcome, Task, outcome_of, task_of
@@ -47,11 +48,11 @@ def diagnose_library(
     folder: str | Path,
     profile: str | Path,
     *,
-    effects: Sequence[str | Path] = (),
+    effect_files: Sequence[str | Path] = (),
     band: float | None = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[str, float | None], None] = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> FleetReport:
     """Diagnose every winch and session of an indexed library that has no diagnosis yet.
 
@@ -61,7 +62,7 @@ def diagnose_library(
         Folder of the runs, which was indexed.
     profile : str or Path
         Profile of all winches, or a folder with ``WINCH.toml`` for each (``/`` as ``-``).
-    effects : sequence of str or Path, optional
+    effect_files : sequence of str or Path, optional
         Files of user effects.
     band : float, optional
         Cut-off of the torque's low-pass, Hz.
@@ -92,7 +93,9 @@ def diagnose_library(
     in the tables, and the next call continues.
     """
     tables = indexed(folder)
-    sources = tuple((Path(file).name, Path(file).read_text(encoding="utf-8")) for file in effects)
+    sources = tuple(
+        (Path(file).name, Path(file).read_text(encoding="utf-8")) for file in effect_files
+    )
     tasks = [task_of(tables, session, profile, sources, band) for session in winch_sessions(tables)]
     rows = tables.read("diagnoses", ("key", "failure")).to_pylist()
     done = {row["key"] for row in rows if row["failure"] is None}
@@ -127,7 +130,7 @@ class _Keeping:
 
     tables: Partitions
     due: int
-    progress: Callable[[str, float | None], None]
+    progress: ProgressCallback
     failures: dict[str, str] = field(default_factory=dict)
     count: int = 0
     waiting: list[Outcome] = field(default_factory=list)

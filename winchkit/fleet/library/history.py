@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from winchkit.arguments import ProgressCallback, no_progress
 from winchkit.errors import FileError, RunError, UsageError, suggest
-from winchkit.fleet.library.index import indexed, no_progress, profile_of_runs, profile_path
+from winchkit.fleet.library.index import indexed, profile_of_runs, profile_path
 from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.library.sessions import WinchSession, run_faults, winch_sessions
 
@@ -76,7 +77,7 @@ def library_history(
     effects: Sequence[str] = (),
     effect_files: Sequence[str | Path] = (),
     limits: Mapping[tuple[str, str], float] | None = None,
-    progress: Callable[[str, float | None], None] = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> LibraryHistory:
     """Fit one set of effects to every session of a library, and test each for changes.
 

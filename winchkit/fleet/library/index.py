@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from winchkit.arguments import path_of
+from winchkit.arguments import ProgressCallback, no_progress, path_of
 from winchkit.errors import Fault, FileError
 from winchkit.fleet.library.description import ProfileOfRuns, described
 from winchkit.fleet.library.files import RunFile, run_files
@@ -41,10 +41,6 @@ class IndexReport:
             "removed": list(self.removed),
             "faults": dict(self.faults),
         }
-
-
-def no_progress(what: str, share: float | None) -> None:
-    """Progress callback that does nothing."""
 
 
 def profile_of_runs(profile: str | Path) -> ProfileOfRuns:
@@ -80,7 +76,7 @@ def profile_path(profile: str | Path, winch: str) -> Path:
 def index_library(
     folder: str | Path,
     profile: str | Path | None = None,
-    progress: Callable[[str, float | None], None] = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> IndexReport:
     """Bring the table of runs of a folder to the state of its files.
 
@@ -126,7 +122,7 @@ class _Indexing:
 
     tables: Partitions
     profile: ProfileOfRuns | None
-    progress: Callable[[str, float | None], None]
+    progress: ProgressCallback
 
     def run(self) -> IndexReport:
         self.progress("looking for runs", None)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from winchkit.arguments import require_type
+from winchkit.arguments import ProgressCallback, no_progress, require_type
 from winchkit.arrays import Array
 from winchkit.bench.lifecycle import stopped_after
 from winchkit.bench.tracker import TrackerReceiver, mean_pose
@@ -109,7 +109,7 @@ def self_calibrated(
     accuracy: float | None = None,
     seed: int = 0,
     compute: Computation = at_once,
-    progress: Callable[[str, float | None], None] = lambda _text, _share: None,
+    progress: ProgressCallback = no_progress,
     keep: Callable[[Run], None] = lambda _run: None,
 ) -> SelfCalibration:
     """Calibrate the robot of an open bench.

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
 
 _STRETCH = 5e-3
+"""Strain at the middle of the limits where no winch declares its stiffness: as of fibre."""
 
 
 @dataclass(frozen=True)

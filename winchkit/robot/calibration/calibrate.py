@@ -19,7 +19,7 @@ from time import perf_counter
 
 import numpy as np
 
-from winchkit.arguments import require_type
+from winchkit.arguments import ProgressCallback, no_progress, require_type
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.fit_statistics import FitStatistics
@@ -34,7 +34,7 @@ from winchkit.robot.calibration.notes import (
     warnings_of,
     worse_rotation,
 )
-from winchkit.robot.calibration.options import Options, ProgressCallback
+from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.outliers import far_off, gross_errors, left_out_poses, unexplained
 from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
@@ -219,7 +219,7 @@ def calibrate(
     fit: MeasuredPoses,
     validation: MeasuredPoses | None = None,
     options: Options | None = None,
-    progress: ProgressCallback = lambda text: None,
+    progress: ProgressCallback = no_progress,
 ) -> Calibrated:
     """Fit a robot's geometry, winches and named effects to poses.
 
@@ -234,7 +234,7 @@ def calibrate(
     options : Options, optional
         Effects and known standard deviations.
     progress : callable, optional
-        Called with a line of progress.
+        Called with the present step and the share that is done; None, since it is not known.
 
     Returns
     -------

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-
-ProgressCallback = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from winchkit.arguments import require_type
+from winchkit.arguments import path_of, require_type
 from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.errors import UsageError
@@ -47,7 +47,12 @@ class Provenance:
 
 
 def write_calibrated(
-    source: Path, found: Calibrated, out: Path, where: Provenance, *, replace: bool = False
+    source: str | Path,
+    found: Calibrated,
+    path: str | Path,
+    where: Provenance,
+    *,
+    replace: bool = False,
 ) -> None:
     """Copy a robot's profile with the estimates of a calibration.
 
@@ -55,7 +60,7 @@ def write_calibrated(
 
     Parameters
     ----------
-    source, out : Path
+    source, path : str or Path
         Profile to copy, and the copy.
     found : Calibrated
         The estimates.
@@ -75,7 +80,8 @@ def write_calibrated(
     require_type(found, Calibrated, "found")
     if found.refusal:
         raise UsageError(found.refusal)
-    refuse_other(source, out, replace)
+    source, path = path_of(source, "source"), path_of(path)
+    refuse_other(source, path, replace)
     document = read_document(source)
     for line in document["line"]:
         _line(line, source, found)
@@ -84,7 +90,7 @@ def write_calibrated(
     _effects(document, found.estimates)
     _platform(document, found.estimates)
     document["fitted"] = _fitted(found, where)
-    write_document(document, out)
+    write_document(document, path)
 
 
 def _instruments(document: Any, found: Calibrated) -> None:

@@ -26,7 +26,8 @@ from math import log
 
 import numpy as np
 
-from winchkit.robot.calibration.options import Options, ProgressCallback
+from winchkit.arguments import ProgressCallback
+from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.prediction import (
     PoseErrors,
     errors_at,
@@ -494,7 +495,7 @@ def _sigma(equations: RobotEquations, options: Options) -> dict[str, float]:
 
 
 def _reporter(progress: ProgressCallback, word: str) -> Callable[[int, float], None]:
-    return lambda step, cost: progress(f"{word}: step {step}, cost {cost:.6g}")
+    return lambda step, cost: progress(f"{word}: step {step}, cost {cost:.6g}", None)
 
 
 def _settled(new: Mapping[str, float], old: Mapping[str, float]) -> bool:

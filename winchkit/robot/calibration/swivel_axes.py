@@ -14,7 +14,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.robot.calibration.options import Options, ProgressCallback
+from winchkit.arguments import ProgressCallback
+from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.selection import (
     DELTA_CHI_SQUARE,
     POINTS,

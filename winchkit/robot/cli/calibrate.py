@@ -34,7 +34,7 @@ from winchkit.errors import UsageError, suggest
 from winchkit.robot.cli.pose_series import PoseSeries, pose_names
 
 if TYPE_CHECKING:
-    from winchkit.cli.core.terminal import ProgressCallback
+    from winchkit.arguments import ProgressCallback
     from winchkit.robot.calibration.calibrate import Calibrated
     from winchkit.robot.calibration.options import Options
     from winchkit.robot.calibration.pose_design import NextPose
@@ -232,7 +232,7 @@ def _calibrated(
     measured = read_poses(read_all(runs), profile)
     held = read_poses(read_all(validate), profile) if validate else None
     progress("fitting", None)
-    return calibrate(robot_of(profile), measured, held, options, note)
+    return calibrate(robot_of(profile), measured, held, options, lambda step, _: note(step))
 
 
 def _tell(found: Calibrated, ahead: Sequence[NextPose]) -> None:

@@ -14,8 +14,8 @@ from winchkit.cli.core.messages import note, suggest_next
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
+    from winchkit.arguments import ProgressCallback
     from winchkit.bench.bench import Bench
-    from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.robot.bench.computation import Computation
     from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration
     from winchkit.robot.calibration.options import Options

@@ -92,8 +92,8 @@ def command(
     counts where all rotations of --turn do; without it the rotation is that of home.
     """
     from winchkit.cli.core.quantities import optional, quantity
+    from winchkit.regular_file import refuse_existing
     from winchkit.robot.workspace.workspace import grid_of, workspace_of
-    from winchkit.runs.files import refuse_existing
 
     if output:
         refuse_existing(Path(output), replace)
@@ -260,7 +260,7 @@ def _write(found: Workspace, condition: str, path: Path) -> None:
         rows = np.column_stack([found.grid.positions, *(v.ravel() for v in found.levels.values())])
         np.savetxt(path, rows, "%.6g", delimiter=",", header=head, comments="")
     else:
-        write_mesh(mesh_of(found, condition), path)
+        write_mesh(mesh_of(found, condition), path, replace=True)
     note(f"written: {path}")
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
+from winchkit.arguments import ProgressCallback, no_progress
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.cross_validation import AT_NOISE
@@ -32,7 +33,6 @@ from winchkit.diagnosis.results import (
     Verdict,
     plain_step,
 )
-from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
     initial_result,

@@ -64,8 +64,7 @@ class PoseSelection(SelectionEngine):
         regression = self.regression
         count = len(regression.bands)
         if not noise.from_repeats:
-            nothing = np.zeros(count)
-            return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
+            return LackOfFitTest(float("nan"), np.zeros(count, bool))
         bands, real = regression.band_of_row, regression.pose_of_row >= 0
         left, _ = np.linalg.qr(_independent(present.jacobian))
         taken = np.bincount(bands[real], np.sum(left**2, axis=1)[real], count)
@@ -73,7 +72,7 @@ class PoseSelection(SelectionEngine):
         dof = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
         p = np.asarray(fdtrc(dof, noise.dof, total / dof))
         worst = float(min(1.0, p.min() * count))
-        return LackOfFitTest(worst, total - dof, p * count < BAND_LEVEL)
+        return LackOfFitTest(worst, p * count < BAND_LEVEL)
 
 
 class TrajectorySelection(PoseSelection):

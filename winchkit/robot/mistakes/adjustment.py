@@ -39,6 +39,7 @@ _STD = {
 """Standard deviations of the priors, m and rad; of a winding radius as a share (rules of thumb:
 several times what a drawing, a tape and a rough set-up are wrong by)."""
 _LEAST_RADIUS = 1e-4
+"""m: bound of a fitted radius, below that of any pulley; a radius of zero is none."""
 ANGLE = 0.01
 """Standard deviation of a measured angle, rad: several times that of a camera tracker."""
 

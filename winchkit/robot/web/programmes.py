@@ -14,6 +14,7 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.robot_programme import RobotProgramme
 
 _DIGITS = 6
+"""Significant digits of positions on the page: a micrometre of a metre."""
 
 
 def preview(declared: RobotProgramme, spec: BenchSpec) -> dict[str, Any]:

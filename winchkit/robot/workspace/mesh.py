@@ -20,8 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arguments import path_of
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
+from winchkit.regular_file import refuse_existing
 from winchkit.robot.workspace.workspace import Grid, Workspace
 
 _STEEP = 20.0
@@ -139,7 +141,7 @@ def _placed(vertex: Array, grid: Grid) -> Array:
     return np.asarray(first + (vertex - 1) * grid.step)
 
 
-def write_mesh(mesh: Mesh, path: str | Path) -> None:
+def write_mesh(mesh: Mesh, path: str | Path, *, replace: bool = False) -> None:
     """Write a mesh as text, by the file's suffix ``.ply`` or ``.obj``.
 
     Parameters
@@ -148,13 +150,16 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
         The surface.
     path : str or Path
         Of the new file; coordinates are in m.
+    replace : bool
+        Write over an existing file.
 
     Raises
     ------
     UsageError
-        For another suffix.
+        For another suffix, and where the file exists and is not to be replaced.
     """
-    path = Path(path)
+    path = path_of(path)
+    refuse_existing(path, replace)
     places = "\n".join(f"{{}}{x:.6g} {y:.6g} {z:.6g}" for x, y, z in mesh.vertex.tolist())
     if path.suffix == ".ply":
         head = (

@@ -73,6 +73,7 @@ class FieldSpec(Table):
 
 
 _ADDRESSES = 0x10000
+"""Registers of a table: an address has 16 bits."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from winchkit import wings
+from winchkit.arguments import path_of
 from winchkit.errors import NotPermitted, UsageError, suggest
+from winchkit.regular_file import refuse_existing
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, ProgrammeStep
@@ -155,20 +157,29 @@ class LiveBench:
 
     # Interface for the user.
 
-    def write_bench_file(self, path: str | Path) -> Path:
+    def write_bench_file(self, path: str | Path, *, replace: bool = False) -> Path:
         """Write the bench file of this run; returns its path.
 
         Parameters
         ----------
         path : str or Path
             File to write.
+        replace : bool
+            Write over an existing file.
 
         Returns
         -------
         Path
             The file.
+
+        Raises
+        ------
+        UsageError
+            Where the file exists and is not to be replaced.
         """
-        return write_bench(self.bench_spec, Path(path))
+        path = path_of(path)
+        refuse_existing(path, replace)
+        return write_bench(self.bench_spec, path)
 
     def answer(self, step: ProgrammeStep) -> None:
         """Execute an operator request of a programme: its ``load_mass``, its ``temperature``.

@@ -20,6 +20,7 @@ from winchkit.schema.programme import Programme
 from winchkit.schema.read import load
 
 _DIGITS = 6
+"""Significant digits of lengths on the page: a micrometre of a metre."""
 _NO_NAME = re.compile(r"[^\w.-]+")
 
 
