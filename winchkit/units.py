@@ -77,7 +77,7 @@ def dimension_of(unit: str) -> str | None:
     return next((name for name, table in UNITS.items() if unit in table), None)
 
 
-def _own_spelling(unit: str, table: Iterable[str]) -> str:
+def own_spelling(unit: str, table: Iterable[str]) -> str:
     """The table's spelling of a unit: ``um`` of ``µm``, ``N m`` of ``Nm``; others unchanged."""
     if unit in table:
         return unit
@@ -89,7 +89,7 @@ def _own_spelling(unit: str, table: Iterable[str]) -> str:
 def factor(unit: str, dimension: str) -> float:
     """SI value of one ``unit``; raises UsageError with the valid units."""
     table = UNITS[dimension]
-    own = _own_spelling(unit, table)
+    own = own_spelling(unit, table)
     if own in table:
         return table[own]
     other = dimension_of(own)
@@ -137,14 +137,18 @@ def parse(text: object, dimension: str) -> float:
         raise UsageError(f"expected {article(dimension)}{with_unit}, not {type(text).__name__}")
     found = number_and_unit(text)
     if found is None or found[1].startswith((",", ":")):
-        is_comma = "," in text and "." not in text
-        hint = f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
-        hint = "; write a ratio as one number, such as 20" if ":" in text else hint
+        hint = "; write a ratio as one number, such as 20" if ":" in text else point_hint(text)
         raise UsageError(f"'{text}' is not a number{with_unit}{hint}")
     value, unit = found
     if not unit and not is_bare(dimension):
         raise UsageError(f"'{text}' has no unit; {_written(dimension)}")
     return convert(value, unit or "1", dimension)
+
+
+def point_hint(text: str) -> str:
+    """``; write the decimal point: 0.5 m`` for a number with a decimal comma, else nothing."""
+    is_comma = "," in text and "." not in text
+    return f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
 
 
 def format_quantity(value: float, unit: str, digits: int = 6) -> str:
