@@ -95,18 +95,21 @@ wound_turns = 6.0
 """
 REFUSED = {
     "cable-elongation-quartic", "cell-lag", "drum-winding-tension", "length-time-offset",
-    "torque-lag", "torque-lead", "prediction-delay", "joint-payload",
+    "torque-lag", "torque-lead", "prediction-delay", "joint-payload", "load-offset",
 }  # fmt: skip
 """Effects of the catalogue whose function is none of one sample, or of the load of a run."""
 BETWEEN = {"cable-hysteresis", "cell-hysteresis", "pulley-inertia"}
 """Effects that use samples on both sides in a run, and differ from it by their step."""
 
 
+SIZES = {"cable-elongation-quartic": {"b2": 100.0}, "torque-saturation": {"cubic": 1e-6}}
+"""Where the typical size is no small change of the random states: 50 N m and more."""
+
+
 def used(effect: Effect) -> Term:
     """An effect of its typical size, with memory at a third of its range."""
     values = {p.name: p.typical if p.role == "amplitude" else p.null for p in effect.parameters}
-    if effect.id == "cable-elongation-quartic":
-        values["b2"] = 100.0
+    values.update(SIZES.get(effect.id, {}))
     return Term(effect, values | ({"start": 0.3} if "start" in values else {}))
 
 

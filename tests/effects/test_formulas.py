@@ -286,6 +286,14 @@ CASES: dict[str, Case] = {
         lambda: {"tension": X.T + 0.002 * _lag(X.T, 50, 0.0)},
     ),
     "torque-constant": ({"gain_error": 0.05}, lambda: {"motor_torque": 1.05 * X.T * X.arm}),
+    "torque-saturation": (
+        {"cubic": 0.2},
+        lambda: {"motor_torque": X.T * X.arm * (1 + 0.2 * (X.T * X.arm) ** 2)},
+    ),
+    "viscous-thermal": (
+        {"viscosity_change": -2e-4},
+        lambda: _torque(-2e-5 * (X.warm - 20.0) * X.rate),
+    ),
     "gear-efficiency": (
         {"efficiency": 0.8},
         lambda: {"motor_torque": X.T * X.arm * np.exp(-X.s * np.log(0.8))},
@@ -326,6 +334,7 @@ CASES: dict[str, Case] = {
     ),
     "length-gain": ({"gain_error": 0.02}, lambda: {"cable_length": 1.02 * X.free}),
     "load-gain": ({"gain_error": 0.02}, lambda: _tension(1.02 * X.T)),
+    "load-offset": ({"mass": 0.9}, lambda: _tension(X.T * (1 + 0.9 / PAYLOAD))),
     "load-lever": (
         {"amplitude": 0.05, "phase": 0.2},
         lambda: _tension(X.T * (1 + 0.05 * np.cos(X.phi + 0.2 - pi / 2))),

@@ -31,6 +31,7 @@ from winchkit.diagnosis.results import (
     RunOffset,
 )
 from winchkit.quantity_text import percent
+from winchkit.report.comparison_rows import failing
 from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.waterfall import falls_of
 from winchkit.report.text import FAILS, addition_text, compare_text, report_text
@@ -234,13 +235,20 @@ def test_a_comparison_has_errors_and_their_attribution() -> None:
     assert lines[-1] == "  a note"
 
 
+def test_a_constant_error_follows_no_variable() -> None:
+    error = OutputError("N", 9, None, 150.0, 2.5, 3.0, -2.4, 0.5, (("direction", 0.94),))
+    assert failing(Comparison({"tension": error}, None)) == [
+        "tension: 92 % is constant; mean −2.4 N"
+    ]
+
+
 def test_a_comparison_says_first_how_large_the_errors_are_and_where_they_fail() -> None:
     sizes = {"cable_length": 1.6e-3, "tension": 4.0, "motor_torque": 0.1, "force": 9.0, "x": 8.0}
     errors = {
         name: OutputError(
             "N", 9, None, 150.0, rms, 9.0, bias, 0.5, (("load", 0.8),), variation=50.0
         )
-        for (name, rms), bias in zip(sizes.items(), (0.0, 3.9, 0.0, 0.0, 0.0), strict=True)
+        for (name, rms), bias in zip(sizes.items(), (0.0, 3.4, 0.0, 0.0, 0.0), strict=True)
     }
     lines = compare_text(Comparison(errors, None)).splitlines()
     assert lines[0] == "The force error is 18 times its noise."
@@ -251,7 +259,7 @@ def test_a_comparison_says_first_how_large_the_errors_are_and_where_they_fail() 
     assert told == [
         "  force: 80 % follows the load",
         "  x: 80 % follows the load",
-        "  tension: 80 % follows the load; mean +3.9 N",
+        "  tension: 80 % follows the load; mean +3.4 N",
     ]
 
 

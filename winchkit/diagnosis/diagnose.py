@@ -63,6 +63,7 @@ from winchkit.diagnosis.verdict.decision import (
     remaining_share,
     verdict_of,
 )
+from winchkit.diagnosis.verdict.dependence import with_dependence
 from winchkit.diagnosis.verdict.equivalence import (
     EquivalenceSet,
     equivalence_set,
@@ -356,7 +357,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         *refitted_steps(engine, found, file, outputs, spread),
         *_steps(engine, found, sets, outputs, known=known, spread=spread),
     )
-    steps = with_compensations(engine, found, file, steps)
+    steps = with_dependence(engine, found, sets, with_compensations(engine, found, file, steps))
     where = _where(regression, found)
     verdict = verdict_of(
         outputs,

@@ -130,8 +130,9 @@ def balance(
     opened = {n: symbol(s.open) * tracer.rates[n] for n, s in tracer.states.items()}
     length = expression(kinematics.free_length)
     load = signal("load") if is_load_known else number(0.0)
+    at = replace(at, payload=load_mass)
     if isinstance(profile, AxisProfile):
-        at, load_mass = replace(at, payload=load_mass), None
+        load_mass = None
     if load_mass is not None:
         falling = rate(rate(length, opened), opened)
         load = number(load_mass) * (number(GRAVITY) - falling)

@@ -37,7 +37,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "half_turn": "a run in which the drum turns by half a turn at least",
     "torque": "a motor_torque channel",
     "prediction": "the torque that another model predicts (--predicted)",
-    "payloads": "load_mass in every run of the axis, of two sizes at least",
+    "payloads": "load_mass in every run, of two sizes at least",
     "cell": "a load channel or load_mass, or a motor_torque that the tension predicts",
 }
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""

@@ -150,7 +150,7 @@ class Line:
             temperature=missing if signals.temperature is None else signals.temperature,
             motor_torque=zero if signals.motor_torque is None else signals.motor_torque,
             predicted_torque=signals.predicted_torque,
-            payload=signals.payload,
+            payload=mass if mass is not None else signals.payload,
             reads_cell=load is None and signals.tension is not None,
         )
         drum_tension = signals.tension if load is None else None

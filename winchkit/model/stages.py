@@ -183,7 +183,7 @@ class At:
     predicted_torque: Array | None = None
     """At the motor by another model, in place of the torque of the cable, N m."""
     payload: float | None = None
-    """Mass that an axis without a cable carries, as the run states, kg."""
+    """Mass that the run states, on the cable or on an axis without one, kg."""
     reads_cell: bool = False
     """Whether ``tension`` is the cell's reading, since no load is known."""
     pulley: int = -1

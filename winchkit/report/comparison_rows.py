@@ -16,6 +16,8 @@ _FAILING = 3
 """Outputs that the short text says where they fail."""
 _BIASED = 0.1
 """Share of the mean square of an error from which its mean is said."""
+_CONSTANT = 0.95
+"""Share of what a variable explains from which its mean alone explains it."""
 _SMALL = 0.1
 """Share of the variance up to which a trend is not said beside an order within a turn."""
 _LENGTHS = ("cable_length", "platform_position")
@@ -58,8 +60,11 @@ def failing(comparison: Comparison) -> list[str]:
             continue
         scale = scale_for(3 * error.rms, error.unit)
         orders = [f"{percent(s)} has {often_per_turn(a, order)}" for a, order, s in _clear(error)]
+        constant = (error.bias / error.rms) ** 2 if error.rms else 0.0
         trends = [
-            f"{percent(share)} follows the {variable_name(v)}"
+            f"{percent(constant)} is constant"
+            if constant > _CONSTANT * share
+            else f"{percent(share)} follows the {variable_name(v)}"
             for v, share in error.follows[:1]
             if share > _SMALL or not orders
         ]

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import SEPARATED
 from winchkit.diagnosis.data.preparation import prepare
-from winchkit.diagnosis.data.repeats import Repeats, outlying_repeat, separated
+from winchkit.diagnosis.data.repeats import Repeats, outlying_repeat, separated, step_of
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile
 
@@ -115,3 +115,19 @@ def test_repeats_exclude_the_same_samples() -> None:
     ]
     assert not own[0].all()
     assert (own[0] == own[1]).all()
+
+
+@pytest.mark.parametrize("index", [0, 2])
+def test_a_step_is_found_where_it_is_all_of_the_difference(index: int) -> None:
+    runs = np.random.default_rng(3).standard_normal((3, 400))
+    runs[index, 250:] += 6.0
+    at, size = step_of(runs, index)
+    assert abs(at - 250) <= 2
+    assert size == pytest.approx(6.0, abs=0.3)
+
+
+@pytest.mark.parametrize("shape", [np.linspace(0.0, 6.0, 400), np.full(400, 6.0)])
+def test_a_drift_or_another_zero_is_no_step(shape: np.ndarray) -> None:
+    runs = np.random.default_rng(4).standard_normal((3, 400))
+    runs[1] += shape
+    assert step_of(runs, 1) is None

@@ -5,6 +5,7 @@ The truth is a closed form: Coulomb, viscous and quadratic friction of a motor w
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,14 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lfilter
 
+from diagnosis_runs import GROOVED, Ride, made, with_channel
 from winchkit import diagnose, read_profile
 from winchkit.arrays import Array
 from winchkit.diagnosis.results import Diagnosis, Step
 from winchkit.diagnosis.verdict.compensation import beside_unknown
 from winchkit.report.words.sentence import headline
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.winch import EffectTable
 
 COULOMB, VISCOUS, QUADRATIC, INERTIA = 0.03, 4e-4, 8e-6, 2e-4
 NOISE = 0.004
@@ -152,3 +155,24 @@ def test_a_law_beside_an_unknown_one_that_changes_the_same_is_not_certain(
     # What acts on another output as well is known from there.
     both = [torque, ("motor_torque", "tension")]
     assert beside_unknown([viscous, other], both, changes)[0] == viscous
+
+
+def test_steps_without_a_common_output_do_not_compensate_each_other() -> None:
+    """A late length and a friction whose reversal the profile has sharp: both over the speed."""
+    friction = EffectTable("motor-coulomb", {"torque": "25 mN m"})
+    profile, ride = (
+        replace(GROOVED, effect=(friction,)),
+        Ride(samples=800, stroke=200.0, period=8.0),
+    )
+    rate = np.gradient(ride.angle, ride.time)
+    made_runs = []
+    for seed in range(2):
+        run = made(seed, GROOVED, load_mass=10.0, ride=ride)
+        torque = run["motor_torque"] + 0.025 * np.tanh(rate / 3.0)
+        late = np.interp(ride.time - 0.1, ride.time, run["cable_length"])
+        run = with_channel(run, "motor_torque", torque, "N m")
+        made_runs.append(with_channel(run, "cable_length", late, "m"))
+    steps = diagnose(made_runs, profile).diagnosis.steps
+    delay = next(step for step in steps if step.effects == ("length-time-offset",))
+    assert delay.certain
+    assert not [doubt for step in steps for doubt in step.doubts if doubt.code == "curve"]

@@ -132,7 +132,10 @@ def test_what_explains_most_comes_first_in_the_headline() -> None:
 
 def test_values_that_print_alike_are_left_out_beside_others() -> None:
     moved = _friction_refitted(0.019996, 0.000077, 0.5)
-    assert step_title(moved) == "transition 0.199 rad/s instead of 0 rad/s in the profile"
+    assert step_title(moved) == (
+        "Coulomb friction of the motor: its reversal is rounded over 0.199 rad/s "
+        "instead of sharp in the profile"
+    )
 
 
 def test_many_refitted_values_are_counted() -> None:

@@ -23,7 +23,13 @@ from winchkit.diagnosis.data.dataset import (
 from winchkit.diagnosis.data.decimation import decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.data.low_pass import RemovedBand, UnfilteredOutput, removed_by_low_pass
-from winchkit.diagnosis.data.repeats import Repeats, excluded_alike, outlying_repeat, separated
+from winchkit.diagnosis.data.repeats import (
+    Repeats,
+    excluded_alike,
+    outlying_repeat,
+    separated,
+    step_of,
+)
 from winchkit.diagnosis.data.sampling import at_new_angles, bridged, evenly_stamped
 from winchkit.diagnosis.data.sanity import findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import fast_count
@@ -245,14 +251,22 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
         for output in dataset.outputs:
             if not all(output in dataset.recordings[run].measured for run in group.runs):
                 continue
-            found = outlying_repeat(_aligned_errors(dataset, group, output))
+            errors = _aligned_errors(dataset, group, output)
+            found = outlying_repeat(errors)
             if found is None:
                 continue
             run, unit = group.runs[found.index], OUTPUT_UNITS[output]
+            cause = "another zero, load or setting that is not recorded"
+            if (step := step_of(errors, found.index)) is not None:
+                sample = group.rows[found.index][step[0]]
+                time = dataset.recordings[run].signals.time[sample]
+                cause = (
+                    f"{quantity(step[1], unit)} from {quantity(float(time), 's')} on, and equal "
+                    "before: something slipped, or was moved, there"
+                )
             text = (
                 f"differs by {quantity(found.rms, unit)} rms from its repeats, these by "
-                f"{quantity(found.usual, unit)} from each other: another zero, load or setting "
-                "that is not recorded; left out"
+                f"{quantity(found.usual, unit)} from each other: {cause}; left out"
             )
             name = dataset.recordings[run].name
             return run, Finding(OUTLYING, name, output, found.rms, text)

@@ -49,6 +49,8 @@ _LEAST_SEPARABLE = 4
 _LEAST_RATIO = 4.0
 """Mean square of the difference from the nearest repeat over that of the others, below which a run
 is only noisier; screened: twice the rms."""
+_STEP = 0.2
+"""Share of the variation of a difference beside a step, up to which it is one; rule of thumb."""
 _LEVEL = 1e-3
 """Level of the F test, Bonferroni over the repeats; convention."""
 
@@ -212,6 +214,26 @@ def outlying_repeat(errors: Array) -> Outlying | None:
     if not _is_larger(nearest[index], nearest[usual], (dof[index], dof[usual]), count):
         return None
     return Outlying(index, float(np.sqrt(nearest[index])), float(np.sqrt(nearest[usual])))
+
+
+def step_of(errors: Array, index: int) -> tuple[int, float] | None:
+    """First sample and size of a step that is all by which a run differs from its repeats; None
+    where it is another difference. The change point is that of least squares.
+    """
+    others = np.delete(errors, index, axis=0)
+    difference = errors[index] - others.mean(axis=0)
+    noise = np.nanvar(others - others.mean(axis=0)) * len(others) / (len(others) - 1)
+    places = np.flatnonzero(np.isfinite(difference))
+    values, count = difference[places], len(places)
+    before = np.arange(1, count)
+    sums = np.cumsum(values)
+    means = sums[:-1] / before, (sums[-1] - sums[:-1]) / (count - before)
+    within = np.sum(values**2) - before * means[0] ** 2 - (count - before) * means[1] ** 2
+    at = int(np.argmin(within))
+    size = float(means[1][at] - means[0][at])
+    is_step = within[at] < _STEP * np.sum((values - values.mean()) ** 2)
+    is_equal_before = means[0][at] ** 2 < max(noise, _STEP * size**2)
+    return (int(places[at + 1]), size) if is_step and is_equal_before else None
 
 
 def separated(group: Repeats, errors: Array) -> list[Repeats]:

@@ -32,6 +32,8 @@ from winchkit.schema.profiles.axis import AxisProfile
 
 _BY_KNOTS = 0.005
 """Share of what a curve explains that the straight pieces between its knots lose."""
+_AS_IN_FILE = 2.0
+"""Standard deviations up to which a value is still that of the file; convention: 95 %."""
 _FACTOR = 1
 """Parameters of a factor."""
 
@@ -84,10 +86,16 @@ def with_compensations(
     """
     terms, out = result.final.hypothesis.terms, list(steps)
     ids = [term.effect.id for term in terms]
-    at = {place: ids.index(step.effects[0]) for place, step in enumerate(steps)}
+    at = {
+        place: ids.index(step.effects[0])
+        for place, step in enumerate(steps)
+        if not _is_of_reversals(step)
+    }
     over = {place: variables_of_law(terms[index]) for place, index in at.items()}
+    acts = {place: {*terms[index].effect.outputs} for place, index in at.items()}
     for variable in sorted(frozenset().union(*over.values())):
-        own = [place for place in at if variable in over[place]]
+        alike = [place for place in at if variable in over[place]]
+        own = [p for p in alike if any(acts[p] & acts[q] for q in alike if q != p)]
         together = _Together.of(engine, result, file, [at[place] for place in own])
         if together is not None and together.is_curve(variable):
             words = variable.replace("_", " ")
@@ -108,8 +116,19 @@ def with_compensations(
     if not any(step.curve for step in out):
         return tuple(out)
     weights = result.noise.inverse_sigma(engine.regression)
-    changes = [weights * change_by(engine.regression, result.final, at[place]) for place in at]
-    return beside_unknown(out, [terms[at[place]].effect.outputs for place in at], changes)
+    index = [ids.index(step.effects[0]) for step in steps]
+    changes = [weights * change_by(engine.regression, result.final, k) for k in index]
+    return beside_unknown(out, [terms[k].effect.outputs for k in index], changes)
+
+
+def _is_of_reversals(step: Step) -> bool:
+    """Whether a refitted effect has its file's values, but for the transition at a reversal."""
+    values = step.parameters[step.effects[0]]
+    return step.refitted and all(
+        abs(values[name].value - old) <= _AS_IN_FILE * values[name].std
+        for name, old in step.file_values.items()
+        if name != TRANSITION
+    )
 
 
 def _doubted(step: Step, code: str, what: str, count: int) -> Step:

@@ -140,8 +140,9 @@ def _drum_roundness(path: Path, at: At, values: Values) -> Path:
     return _with_wave(path, values["amplitude"], lobes * at.drum_angle, values["phase"], lobes)
 
 
-_LOBES = 2.0, 3.0, 4.0, 6.0, 8.0
-"""Oval drums, jaws of a chuck, and drums of four, six or eight bars."""
+_LOBES = 2.0, 3.0, 4.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0
+"""Oval drums, jaws of a chuck, drums of bars: neighbours are no start for each other. Five is the
+example of an effect of one's own (docs/howto/effect.md)."""
 
 DRUM_ROUNDNESS = Effect(
     id="drum-roundness",

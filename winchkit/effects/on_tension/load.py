@@ -57,6 +57,30 @@ LOAD_GAIN = Effect(
 )
 
 
+def _load_offset(force: Array, at: At, values: Values) -> Array:
+    """Force with a mass that hangs beside the stated one, and moves with it."""
+    if at.payload:
+        return force * (1.0 + values["mass"] / at.payload)
+    return force + GRAVITY * values["mass"]
+
+
+LOAD_OFFSET = Effect(
+    id="load-offset",
+    stage=Stage.LOAD,
+    parameters=(Parameter("mass", "kg", null=0.0, typical=0.5, low=-1e4, high=1e5),),
+    apply=_load_offset,
+    outputs=("tension", "motor_torque"),
+    what="The load is heavier by the same mass in all runs: a hook, a block, a sling.",
+    formula="F (1 + m/M), M the run's load_mass; F + m g without it",
+    source="weight and inertia of a mass that was not weighed",
+    looks_like="The same force in tension and torque at every load, in both directions.",
+    confused_with=("load-gain", "cell-offset", "motor-coulomb-asymmetry"),
+    told_apart="Tension and torque together; two loads distinguish it from a share of the load.",
+    needs=("cable", "payloads"),
+    left_out="it corrects the load that runs state; weigh the hook, and correct 'load_mass'",
+)
+
+
 def _cable_weight(tension: Array, at: At, values: Values) -> Array:
     """Tension plus the weight of the free cable along its direction."""
     along = GRAVITY * sin(at.profile.path.inclination)

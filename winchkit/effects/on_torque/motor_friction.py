@@ -56,6 +56,12 @@ MOTOR_COULOMB_ASYMMETRY = Effect(
 )
 
 
+_WHERE_OILS_ARE_NAMED = 40.0
+"""Degrees Celsius, convention; another shifts the viscosity, which is fitted beside it."""
+_WARMER = 10.0
+"""K, convention: the parameter is the change of the viscosity over ten degrees."""
+
+
 def _motor_viscous(torque: Array, at: At, values: Values) -> Array:
     return torque + values["viscosity"] * at.motor_rate
 
@@ -74,6 +80,31 @@ MOTOR_VISCOUS = Effect(
     confused_with=("motor-coulomb", "pulley-viscous"),
     told_apart="A ladder of speeds in both directions.",
     family="motor friction",
+)
+
+
+def _viscous_thermal(torque: Array, at: At, values: Values) -> Array:
+    warmth = (at.temperature - _WHERE_OILS_ARE_NAMED) / _WARMER
+    return torque + values["viscosity_change"] * warmth * at.motor_rate
+
+
+VISCOUS_THERMAL = Effect(
+    id="viscous-thermal",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("viscosity_change", "N m s", null=0.0, typical=-3e-4, low=-1e6, high=1e6),
+    ),
+    apply=_viscous_thermal,
+    outputs=("motor_torque",),
+    variable="temperature",
+    what="The viscous friction changes with the temperature: oil and grease thin as they warm.",
+    formula="τ + k θ' (temperature − 40 °C)/10 K",
+    source="viscosity of oils over temperature (ISO 3448: at 40 °C), linear",
+    looks_like="A torque error in proportion to the speed that shrinks as the machine warms.",
+    confused_with=("motor-viscous", "friction-growth"),
+    told_apart="The same motion cold and warm, at two speeds.",
+    family="motor friction",
+    needs=("temperature",),
 )
 
 

@@ -47,6 +47,32 @@ TORQUE_CONSTANT = Effect(
 )
 
 
+_UNIT_TORQUE = 1.0
+"""N m, convention: the parameter is the error there."""
+
+
+def _torque_saturation(torque: Array, at: At, values: Values) -> Array:
+    return torque + values["cubic"] * (torque / _UNIT_TORQUE) ** 3
+
+
+TORQUE_SATURATION = Effect(
+    id="torque-saturation",
+    stage=Stage.TORQUE_CONSTANT,
+    parameters=(Parameter("cubic", "N m", null=0.0, typical=0.1, low=-1e6, high=1e6),),
+    apply=_torque_saturation,
+    outputs=("motor_torque",),
+    variable="load",
+    what="The iron of the motor saturates: the torque constant falls with the current.",
+    formula="τ + k (τ/1 N m)³, τ the torque by the constant of small currents",
+    source="torque over current of data sheets, first odd term beside the proportional one",
+    looks_like="A torque error that grows faster than the load, equal in both directions.",
+    confused_with=("torque-constant", "gear-efficiency"),
+    told_apart="Three loads at least, up to the motor's peak torque.",
+    needs=("cable_force",),
+    order=1,
+)
+
+
 def _torque_ripple(torque: Array, at: At, values: Values) -> Array:
     wave = np.sin(values["order"] * at.motor_angle + values["phase"])
     return torque * (1.0 + values["amplitude"] * wave)

@@ -111,6 +111,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
     "layer-thickness": ("growth of the cable layers", "the growth of the cable layers is wrong"),
     "length-gain": ("gain of the length instrument", "the length instrument has a gain error"),
     "load-gain": ("stated load", "the load differs from the one that the runs state"),
+    "load-offset": ("mass beside the stated load", "the load is heavier by a mass not stated"),
     "length-time-offset": ("delay of the length instrument", "the length instrument is delayed"),
     "load-lever": ("lever of the load", "the load acts through a lever"),
     "motor-cogging": ("cogging of the motor", "the motor has cogging torque"),
@@ -162,6 +163,10 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "torque constant of the drive",
         "the torque constant of the drive is wrong",
     ),
+    "torque-saturation": (
+        "saturation of the motor",
+        "the torque constant of the motor falls with the current",
+    ),
     "torque-lag": ("delay of the torque signal", "the torque signal of the drive is delayed"),
     "torque-ripple": (
         "ripple of the torque constant",
@@ -170,6 +175,10 @@ EFFECTS: dict[str, tuple[str, str]] = {
     "torque-lead": (
         "lead of the torque signal",
         "the torque signal is the command, ahead of the torque",
+    ),
+    "viscous-thermal": (
+        "temperature of the viscous friction",
+        "the viscous friction of the motor side depends on the temperature",
     ),
 }
 """Name and clause by id."""

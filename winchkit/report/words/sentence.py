@@ -58,7 +58,10 @@ def headline(diagnosis: Diagnosis) -> str:
     if wrong_channels(diagnosis):
         return "A channel looks wrong: no effect was looked for"
     if verdict == "adequate":
-        return f"{'No' if _noise_is_known(diagnosis) else 'No known'} effect is missing"
+        what = f"{'No' if _noise_is_known(diagnosis) else 'No known'} effect is missing"
+        apart = list(dict.fromkeys(f.run for f in diagnosis.sanity if f.code == "outlying-repeat"))
+        verb = "differs from its repeats and is" if len(apart) == 1 else "differ and are"
+        return f"{what}, but {listed(apart)} {verb} left out" if apart else what
     if verdict == "undecided":
         what = f"The {worst} error" if not steps else f"What remains of the {worst} error"
         return f"{what} may be noise: these runs cannot decide"

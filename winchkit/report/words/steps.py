@@ -149,7 +149,9 @@ def step_title(step: Step) -> str:
     if step.whole:
         return _WHOLE
     if step.refitted:
-        return f"{_refitted_values(step, with_errors=False)} in the profile"
+        changed = f"{_refitted_values(step, with_errors=False)} in the profile"
+        of_reversal = changed.startswith(_REVERSAL)
+        return f"{effect_name(step.effects[0])}: {changed}" if of_reversal else changed
     if has_other_law(step):
         return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
     kinds = kinds_of(step)
@@ -237,6 +239,10 @@ def kinds_of(step: Step) -> list[str]:
     return list(first.values())
 
 
+_REVERSAL = "its reversal is rounded over"
+"""Of a friction; begins the change of a transition."""
+
+
 def _refitted_values(step: Step, *, with_errors: bool) -> str:
     """``axial stiffness 300 kN instead of 100 kN``; values that print alike only where all do."""
     out, alike = list[str](), list[str]()
@@ -247,7 +253,9 @@ def _refitted_values(step: Step, *, with_errors: bool) -> str:
         scale = scale_for((estimate.value, old), estimate.unit)
         std = estimate.std if with_errors else float("nan")
         new = with_std(estimate.value, std, estimate.unit, scale)
-        changed = f"{name.replace('_', ' ')} {new} instead of {scale.text(old)}"
+        is_sharp = name == TRANSITION and old == 0.0
+        before, what = ("sharp", _REVERSAL) if is_sharp else (scale.text(old), name)
+        changed = f"{what.replace('_', ' ')} {new} instead of {before}"
         (alike if scale.text(estimate.value) == scale.text(old) else out).append(changed)
     return listed(out or alike)
 
