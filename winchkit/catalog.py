@@ -71,8 +71,9 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
         raise FileError(f"{name}: is {special} and no {_SINGULAR[kind]}; name a file")
     known = [own for own in names(kind) if not own.startswith("programme-")]
     listed = f" ({', '.join(known)})" if known else ""
+    there = sorted(path.name for path in base.glob("*.toml"))
     other = next((_SINGULAR[each] for each in _SINGULAR if name in names(each)), None)
     raise FileError(
         f"there is no {_SINGULAR[kind]} '{name}', neither as a file nor shipped{listed}"
-        + (f"; '{name}' is a shipped {other}" if other else suggest(name, known))
+        + (f"; '{name}' is a shipped {other}" if other else suggest(name, [*known, *there]))
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
 from winchkit.errors import UsageError, suggest
 
@@ -27,7 +28,7 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "gain": {"1/s": 1.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
-    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "daN": 10.0, "MN": 1e6},
     "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "kN m": 1e3},
     "mass": {"kg": 1.0, "g": 1e-3, "t": 1e3},
     "mass per length": {"kg/m": 1.0, "g/m": 1e-3},
@@ -57,6 +58,11 @@ UNITS: dict[str, dict[str, float]] = {
     "number per second": {"1": 1.0},
 }
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
+_SPELLED = str.maketrans(
+    {"µ": "u", "μ": "u", "°": "deg", "²": "^2", "³": "^3", "·": " ", "*": " ", "⋅": " "}
+)
+"""As units are printed and written elsewhere."""
+_SAME_UNITS = {"1/min": "rpm", "U/min": "rpm", "rev": "turn", "sec": "s"}
 _ZERO_CELSIUS = 273.15
 """K (exact by the definition of the degree Celsius)."""
 
@@ -71,12 +77,22 @@ def dimension_of(unit: str) -> str | None:
     return next((name for name, table in UNITS.items() if unit in table), None)
 
 
+def own_spelling(unit: str, table: Iterable[str]) -> str:
+    """The table's spelling of a unit: ``um`` of ``µm``, ``N m`` of ``Nm``; others unchanged."""
+    if unit in table:
+        return unit
+    plain = _SAME_UNITS.get(unit, unit.translate(_SPELLED))
+    joined = {own.replace(" ", ""): own for own in table}
+    return joined.get(plain.replace(" ", ""), plain) if " " not in unit else plain
+
+
 def factor(unit: str, dimension: str) -> float:
     """SI value of one ``unit``; raises UsageError with the valid units."""
     table = UNITS[dimension]
-    if unit in table:
-        return table[unit]
-    other = dimension_of(unit)
+    own = own_spelling(unit, table)
+    if own in table:
+        return table[own]
+    other = dimension_of(own)
     if other is None:
         fault = f"unknown{'' if is_bare(dimension) else f' {dimension}'} unit '{unit}'"
     else:
@@ -121,14 +137,18 @@ def parse(text: object, dimension: str) -> float:
         raise UsageError(f"expected {article(dimension)}{with_unit}, not {type(text).__name__}")
     found = number_and_unit(text)
     if found is None or found[1].startswith((",", ":")):
-        is_comma = "," in text and "." not in text
-        hint = f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
-        hint = "; write a ratio as one number, such as 20" if ":" in text else hint
+        hint = "; write a ratio as one number, such as 20" if ":" in text else point_hint(text)
         raise UsageError(f"'{text}' is not a number{with_unit}{hint}")
     value, unit = found
     if not unit and not is_bare(dimension):
         raise UsageError(f"'{text}' has no unit; {_written(dimension)}")
     return convert(value, unit or "1", dimension)
+
+
+def point_hint(text: str) -> str:
+    """``; write the decimal point: 0.5 m`` for a number with a decimal comma, else nothing."""
+    is_comma = "," in text and "." not in text
+    return f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
 
 
 def format_quantity(value: float, unit: str, digits: int = 6) -> str:

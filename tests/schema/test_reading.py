@@ -322,6 +322,12 @@ def test_quantities_as_written() -> None:
     assert parse("3", "ratio") == parse(3, "ratio") == 3.0
     assert parse("90 deg", "angle") == pytest.approx(math.pi / 2)
     assert parse("inf N", "force") == math.inf
+    assert parse("50 µm", "length") == parse("50 um", "length"), "as it is printed"
+    assert parse("90 °", "angle") == parse("90°", "angle") == parse("90 deg", "angle")
+    assert parse("1500 1/min", "angular speed") == parse("1500 rpm", "angular speed")
+    assert parse("2 Nm", "torque") == parse("2 N·m", "torque") == 2.0
+    assert parse("3 m/s²", "acceleration") == 3.0
+    assert parse("1.2 kg·cm²", "inertia") == parse("1.2 kg cm^2", "inertia")
     assert format_quantity(0.06, "mm") == "60 mm"
     for text in ("60", 60, "mm", "60 kg", "1_0 mm", "nan mm", "0x10 mm", "", True, None):
         with pytest.raises(UsageError):

@@ -130,6 +130,9 @@ def test_verdict_ladder_and_residual_are_seen_at_a_height_of_900(
     browser: Any, served: Served
 ) -> None:
     page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
+    steps = "document.querySelector('.found ol')"  # as many lines as five steps with their doubts
+    page.evaluate(f"{steps}.append(...Array.from({{ length: 15 }}, (_, i) => `step ${{i}}\\n`))")
+    page.evaluate(f"{steps}.style.whiteSpace = 'pre'")
     box = page.locator("#time .plot").nth(1).bounding_box()
     assert box["y"] + box["height"] <= 900
     heights = {row.bounding_box()["height"] for row in page.locator(".ladder .name").all()}

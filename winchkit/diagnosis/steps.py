@@ -141,11 +141,11 @@ def standing_of(
     chances = [p for name in there if (p := outputs[name].p_value) is not None]
     remaining = ""
     if not trusted or left > CERTAIN * explained:
-        remaining = "it leaves more than a tenth of what it explains: another effect may act too"
+        remaining = "it explains this error only in part: another effect may act too"
     elif left + known_to > CERTAIN * explained:
         remaining = "the noise is too uncertain to exclude another effect"
     elif left > _WELL_KNOWN * explained and any(p < _REJECTED for p in chances):
-        remaining = "what it leaves is no noise: its law may be another one"
+        remaining = "the error that remains is not noise: another law may fit better"
     return Standing(share, remaining, explained)
 
 
@@ -169,7 +169,7 @@ def with_standing(
             what += ", if friction may build up gradually at a reversal"
         doubts.append(Doubt("reversal", what))
     if small:
-        what = "another step explains ten times as much there: this may be an error of its law"
+        what = "another step explains ten times as much there, and this one may only correct it"
         doubts.append(Doubt("small", what))
     single = len(step.effects) == 1
     established = single and curve is None

@@ -250,6 +250,8 @@ def load(path: PathLike, kind: str | None = None) -> Declaration:
     if kind is not None and found != kind:
         without = ", which has no drum and no cable" if found == "axis" else ""
         message = f"is '{found}'{without}; a '{kind}' is needed here"
+        if (found, kind) == ("sim-bench", "bench"):
+            message += f"; 'winchkit sim serve {path} --bench-file bench.toml' writes one"
         raise FileError(reading.source.fault(("kind",), message))
     read: Reader = _READERS.get(found) or wings.reader(found)
     value = read(reading, reading.source.tree)

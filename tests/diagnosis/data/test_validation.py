@@ -132,6 +132,13 @@ def test_a_constant_load_is_a_weight_and_no_fault() -> None:
     assert validate_runs([known_weight], GROOVED) == []
 
 
+def test_a_tension_that_has_to_serve_as_the_load_is_said() -> None:
+    unweighed = replace(made(1), metadata={})
+    (note,) = validate_runs([unweighed], GROOVED)
+    assert note.startswith("tension is not compared but taken as the load")
+    assert validate_runs([unweighed, GOOD], GROOVED) == [], "one states it"
+
+
 def test_a_small_stroke_is_not_taken_for_another_winch() -> None:
     """A stroke of millimetres under a long stretch says nothing of the ratio."""
     creeping = made(0, ride=Ride(stroke=0.05), noise={"cable_length": 3e-4})

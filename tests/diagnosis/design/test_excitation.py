@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from diagnosis_runs import GROOVED, NOISE, Array, Ride, made, with_channel
+from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from winchkit.diagnosis.data.preparation import prepare
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -19,7 +19,6 @@ NOTES = {
     "repeat": "no run repeats another",
     "no force": "no load and no tension",
     "one load": "one load only",
-    "no load": "no load known",
     "one way": "one direction only",
     "no reversal": "no reversals",
     "one speed": "one speed only",
@@ -72,16 +71,6 @@ def test_a_temperature_that_one_run_lacks_is_not_measured() -> None:
     given = runs()
     given[1] = made(1, ride=RIDE)
     assert said(given) == {"no warmth"}
-
-
-def test_a_cell_alone_is_no_load() -> None:
-    """Its tension stands in, and then the cell and the pulleys cannot be seen."""
-    given = []
-    for mass in (10.0, 20.0):
-        for seed in range(2):
-            run = made(seed, load_mass=mass, noise=NOISE, ride=RIDE)
-            given.append(warm(replace(run, metadata={})))
-    assert said(given) == {"no load"}
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -79,6 +79,7 @@ def test_a_row_has_the_facts_of_its_run(library: Path) -> None:
     [
         ("w/x.csv", {"source Date": "2026-03-01 14:30:05"}, "2026-03-01T14:30:05", "metadata"),
         ("w/x.csv", {"date": "2026-03-01", "time": "9:30"}, "2026-03-01T09:30:00", "metadata"),
+        ("w/x.csv", {"recorded": "2026-03-01T09:30:00+00:00"}, "2026-03-01T09:30:00", "metadata"),
         (
             "w/x.csv",
             {"source Date": "1.3.2026", "source Time": "14:30:05"},

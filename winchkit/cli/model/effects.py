@@ -108,11 +108,15 @@ def show(words: Sequence[str], files: Sequence[str], html: str | None) -> None:
 
 
 def _found(catalogue: Catalogue, words: Sequence[str]) -> list[Effect]:
-    """Effects with all words in id, name or description."""
+    """Effects with all words in id, name, description or the pattern that they leave."""
     from winchkit.report.words.vocabulary import clause, effect_name
 
-    texts = {e.id: f"{e.id} {effect_name(e.id)} {clause(e.id)} {e.what}" for e in catalogue}
-    return [e for e in catalogue if all(word.lower() in texts[e.id].lower() for word in words)]
+    texts = {
+        e.id: f"{e.id} {effect_name(e.id)} {clause(e.id)} {e.what} {e.looks_like}".lower()
+        for e in catalogue
+    }
+    asked = " ".join(words).lower().split()
+    return [e for e in catalogue if all(word in texts[e.id] for word in asked)]
 
 
 def _listing(effects: Sequence[Effect]) -> str:

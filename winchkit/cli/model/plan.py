@@ -116,7 +116,7 @@ def _plan_winch(
     chosen = found.offers[0].kind.name if path else None
     texts = plan_texts(found)
     if found.inseparable and limits is None:
-        texts.append("With --bench BENCH.toml the plan goes as far as that bench may.")
+        texts.append("With --bench BENCH.toml the plan uses the whole range of that bench.")
     said = [line for text in texts for line in paragraph(text)]
     lines = [_text(found), *said] if found.pairs else [_first(found), *said, "", _text(found)]
     tell({**found.to_json(), "programme": path, "chosen": chosen}, lines)
@@ -188,7 +188,9 @@ def _text(plan: WinchPlan) -> str:
         f"  {letter}: {a.effect.id} / {b.effect.id}"
         for letter, (a, b) in zip(letters, pairs, strict=False)
     ]
-    besides = paragraph(f"the first could also show: {_shown(found[0])}", "  ", "    ")
+    besides: list[str] = []
+    if found[0].shows:
+        besides = paragraph(f"the first could also show: {_shown(found[0])}", "  ", "    ")
     return "\n".join([*head, *aligned(table), *besides])
 
 

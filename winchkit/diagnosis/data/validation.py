@@ -20,6 +20,7 @@ from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.repeated_values import constant
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 _LEAST_SAMPLES = 50
@@ -49,7 +50,9 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
         faults = _alike([fault for run in runs for fault in _other_winch(run, profile)])
     if faults:
         raise RunError(faults)
-    return [*_missing(runs), *(note for run in runs for note in _other_profile(run, profile))]
+    unweighed = [] if isinstance(profile, AxisProfile) else _unweighed(runs)
+    others = [note for run in runs for note in _other_profile(run, profile)]
+    return [*unweighed, *_missing(runs), *others]
 
 
 _FACTOR = re.compile(r"^changes by \S+")
@@ -187,6 +190,19 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
 
 def _slope(predicted: Array, measured: Array) -> float:
     return float(np.polyfit(predicted - predicted.mean(), measured, 1)[0])
+
+
+def _unweighed(runs: Sequence[Run]) -> list[str]:
+    """A note where the cell's reading has to serve as the load of every run."""
+    if not any("tension" in run for run in runs):
+        return []
+    if any("load" in run or run.load_mass is not None for run in runs):
+        return []
+    return [
+        "tension is not compared but taken as the load, since no run states its load: friction of "
+        "pulleys and errors of the cell cannot be seen; state it in the head of each file "
+        "(# load_mass: 10 kg) or at its import, or record a second cell"
+    ]
 
 
 def _missing(runs: Sequence[Run]) -> list[str]:

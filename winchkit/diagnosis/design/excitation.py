@@ -39,11 +39,6 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
             "one load only: cable elasticity and frame compliance, cell gain and offset are hard "
             "to distinguish; repeat a run under another load"
         )
-    if loads and all(r.raw.load is None for r in dataset.recordings):
-        notes.append(
-            "no load known: pulley friction cannot be detected, nor a wrong gain or offset of the "
-            "cell distinguished from those of the torque; give load_mass or a second cell"
-        )
     notes += _motions([r.raw.at.speed for r in dataset.recordings])
     temperatures = [r.signals.temperature for r in dataset.recordings]
     if any(t is None for t in temperatures):

@@ -155,8 +155,8 @@ GEAR_BACKLASH = Effect(
     ),
     apply=_gear_backlash,
     outputs=("cable_length", "motor_torque"),
-    what="Clearance between teeth: after a reversal the drum stands until the other flank is in "
-    "contact.",
+    what="Clearance (play) between teeth: after a reversal the drum stands until the other flank "
+    "is in contact.",
     formula="play operator of gap b on φ; held: share of the cable's torque within the gap, "
     "except in the last fiftieth before a flank; start: position in the gap at the run's "
     "start, −½ to ½",

@@ -35,7 +35,7 @@ CABLE_ELONGATION_LINEAR = Effect(
     apply=_cable_elongation_linear,
     outputs=("cable_length",),
     variable="load",
-    what="The cable is elastic: it is longer by its strain times its stressed length.",
+    what="The cable is elastic: it stretches by its strain times its stressed length.",
     formula="ℓ + ℓ_s T / EA, ℓ_s = ℓ + dead length",
     source="Hooke; IPAnema 3 paper, Eq. 4; steel EA = 50–105 GPa × fill × area",
     looks_like="A length error in proportion to tension times length.",

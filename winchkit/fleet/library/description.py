@@ -23,9 +23,9 @@ from winchkit.runs.sanity.inspection import inspect_run
 
 _DATE = re.compile(r"\d{4}\D?\d{2}(\D?\d{2})?\b.*")
 """Name of a folder that begins with a date: a session, and no winch."""
-_STARTS = ("start_time", "started", "begun", "date")
-"""Metadata with the time of the first sample, ISO 8601; of another program's file with the prefix
-``source``, in any case."""
+_STARTS = ("start_time", "started", "begun", "date", "recorded")
+"""Metadata with the time of the first sample, ISO 8601; ``recorded`` is that of a bench. Of another
+program's file with the prefix ``source``, in any case."""
 _SOURCE = "source "
 _DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(.*)")
 """A date with points has its day first; one with slashes is ambiguous and not used."""

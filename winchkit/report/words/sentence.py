@@ -231,10 +231,10 @@ def plan_texts(found: WinchPlan) -> list[str]:
         shows = ISOLATING[found.isolates.variable][1]
         texts.append(f"It isolates what no effect explains: {where_text(found.isolates)}. {shows}")
     for one, other in found.inseparable:
+        what = told_apart(one.effect, other.effect)
         texts.append(
-            f"{one.effect.id} / {other.effect.id}: no such motion within {at.low:.2f} m to "
-            f"{at.high:.2f} m distinguishes them. To decide: "
-            f"{told_apart(one.effect, other.effect)}"
+            f"No motion within {at.low:.2f} m to {at.high:.2f} m decides"
+            f"{_between((one.effect.id, other.effect.id))}. What does: {what[:1].lower()}{what[1:]}"
         )
     if not texts and not found.pairs and not any(offer.shows for offer in found.offers):
         texts.append(

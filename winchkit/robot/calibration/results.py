@@ -163,8 +163,8 @@ def _errors(found: Calibrated) -> Iterator[str]:
     if isfinite(found.noise_ratio):
         kind = "position" if isfinite(rms(after.distance)) else "closure"
         yield (
-            f"held out: {found.noise_ratio:.2g} times the instruments' noise of "
-            f"{_shown(found.instrument_noise[kind], 'm')} (a real robot: 5 to 20)"
+            f"The held-out error is {found.noise_ratio:.2g} times the instruments' noise of "
+            f"{_shown(found.instrument_noise[kind], 'm')} (real robots: 5 to 20)."
         )
     yield (
         f"{found.observed.rank} of {found.observed.free} parameter directions identifiable, "

@@ -10,7 +10,7 @@ import click
 
 from winchkit.cli.core.command import Example
 from winchkit.cli.core.completion import complete_effect, complete_sim_bench
-from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.messages import detail, note, suggest_next
 from winchkit.cli.core.options import (
     PROFILE,
     RUN,
@@ -232,7 +232,7 @@ def _calibrated(
     measured = read_poses(read_all(runs), profile)
     held = read_poses(read_all(validate), profile) if validate else None
     progress("fitting", None)
-    return calibrate(robot_of(profile), measured, held, options, lambda step, _: note(step))
+    return calibrate(robot_of(profile), measured, held, options, lambda step, _: detail(step))
 
 
 def _tell(found: Calibrated, ahead: Sequence[NextPose]) -> None:

@@ -101,9 +101,10 @@ def _indistinguishable(plan: PosePlan) -> list[str]:
     lines = []
     for index, (first, second) in enumerate(plan.pairs):
         if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
-            names = f"{first.effect.id} / {second.effect.id}"
+            names = f"{first.effect.id} and {second.effect.id}"
             what = told_apart(first.effect, second.effect)
-            lines += paragraph(f"{names}: no such poses distinguish them. To decide: {what}")
+            what = f"What does: {what[:1].lower()}{what[1:]}"
+            lines += paragraph(f"No such poses decide between {names}. {what}")
     if plan.best is None and not plan.pairs:
         hidden = ", ".join(term.effect.id for term in plan.hidden)
         lines += paragraph(f"No such poses would show what these did not: {hidden}.")

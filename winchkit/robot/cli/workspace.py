@@ -216,7 +216,8 @@ def _text(robot: Robot, found: Workspace, demand: CableDemand) -> str:
         if len(grid.rotation) == 1
         else (f"in {len(grid.rotation)} rotations each")
     )
-    lines = [f"{robot.profile.name}: {poses} poses, cells of {grid.step * 1e3:.4g} mm, {about}"]
+    size = f"{poses} poses, cells of {grid.step * 1e3:.4g} mm"
+    lines = [f"{robot.profile.name}: where each condition holds, {about} ({size})"]
     for name in found.levels:
         volume, uncertainty = found.volume(name)
         size = f"{with_std(volume, uncertainty, '1')} {_unit(grid)}" if volume else "nowhere"

@@ -49,17 +49,13 @@ function render() {
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
-    // Beside a candidate's card stand the ladder and the curves, so that both are seen at a height of 900 px.
-    const open = d.patterns.length > 0, narrow = shown.effect && !open, next = () => el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" });
+    // Steps and cards have a column of their own: ladder and residual are seen at a height of 900 px, whatever the number of steps.
+    const open = d.patterns.length > 0, panel = (id, label, more = "") => el("section", { class: `panel ${more}`, id, "aria-label": label });
+    const side = [d.steps.length && el("section", { class: "panel found", "aria-label": "Effects that were found" }, stepList(d.steps)), shown.effect && panel("card", "Candidate", "card"), open && panel("next", "What to do next", "card next")].filter(Boolean);
     root.append(head(d), el("div", { class: "grid" },
-      el("section", { class: `panel ${shown.effect || open ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
-      shown.effect && el("section", { class: `panel w4 card ${narrow ? "tall" : ""}`, id: "card", "aria-label": "Candidate" }),
-      open && !shown.effect && next(),
-      open && el("section", { class: "panel w8", id: "pattern", "aria-label": "The curve to explain" }),
-      open && shown.effect && next(),
-      el("section", { class: `panel ${narrow ? "w8" : "w7"}`, id: "time", "aria-label": "Measured and predicted" }),
-      el("section", { class: `panel ${narrow ? "w12 low" : "w5"}`, id: "over", "aria-label": "Residual against each variable" }),
-      el("section", { class: "panel w12", id: "data" })), channelPanel(view));
+      el("div", { class: `stacked ${side.length ? "w8" : "w12"}` }, panel("ladder", "Held-out error of each candidate"), open ? panel("pattern", "The curve to explain") : null, panel("time", "Measured and predicted")),
+      side.length ? el("div", { class: "stacked w4" }, side) : null,
+      panel("over", "Residual against each variable", "w12"), panel("data", null, "w12")), channelPanel(view));
     drawLadder(); drawTime(); drawMultiples(); drawData();
     if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
     if (shown.effect) drawCard();
@@ -173,13 +169,12 @@ function showCommands() {
 
 function head(d) {
   return el("div", { class: "verdict" }, el("div", { class: "head" }, el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip), el("h1", {}, d.headline)),
-    d.sentence ? el("p", {}, coloured(d.sentence)) : null, stepList(d.steps));
+    d.sentence ? el("p", {}, coloured(d.sentence)) : null);
 }
 
 // Every effect of the model with its values, and the doubts about it below.
 function stepList(steps) {
-  return steps.length ? el("ol", { class: "found" }, steps.map((step) => el("li", {}, step.text,
-    step.doubts.length ? el("ul", {}, step.doubts.map((text) => el("li", {}, text))) : null))) : null;
+  return el("ol", {}, steps.map((step) => el("li", {}, step.text, step.doubts.length ? el("ul", {}, step.doubts.map((text) => el("li", {}, text))) : null)));
 }
 
 // The errors before and after in the colours of the ladder, and no line break before a unit.
@@ -242,10 +237,10 @@ async function drawCard() {
     const host = el("div", { class: "plot" });
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}. To decide: ${card.told_apart}`) : null;
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
-      host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), el("span", { class: "note" }, `over ${nameOf(card.signature.label)}`), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
+      host, card.signature ? el("div", { class: "row" }, el("span", { class: "note" }, `${card.signature.unit} over ${nameOf(card.signature.label)}`), legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
-      equal, card.next ? el("p", { class: "note" }, card.next) : null,
+      view.diagnosis.steps.length > 1 ? el("p", { class: "note" }, "Values of a fit of this effect alone; the steps have those of all together.") : null, equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: view.diagnosis.verdict === "unknown" ? "" : "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
         el("button", { onclick: planRun }, "Plan a run")));
     if (card.signature) drawSignature(host, card.signature);
@@ -259,7 +254,8 @@ async function drawPattern() {
   fill(next, el("h2", {}, "What to do next"));
   await drawAnswer(box, () => ask("/api/pattern?number=0"), (found) => {
     const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
-    fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), el("span", { class: "note" }, `over ${nameOf(found.label)}`), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
+    fill(box, el("header", {}, el("h2", {}, found.title), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))),
+      el("div", { class: "row" }, el("span", { class: "note" }, `${found.unit} over ${nameOf(found.label)}`), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true])), host);
     const { columns } = sorted(found.x, found.residual);
     plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic, names: ["residual"], unit: found.unit,
       traces: [{ name: "mean", x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ name: "law", x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
@@ -349,7 +345,7 @@ async function drawMultiples() {
   await drawAnswer(box, () => ask(`/api/multiples?output=${output}${over.map((name) => `&over=${encodeURIComponent(name)}`).join("")}`), (found) => {
     const grid = el("div", { class: "multiples" }), drawnOver = found.panels.map((panel) => panel.variable), others = found.variables.filter(([name]) => !drawnOver.includes(name));
     const another = others.length ? el("select", { class: "another", "aria-label": "Another variable", onchange: () => { over = [another.value, ...drawnOver.slice(0, -1)]; drawMultiples(); } }, el("option", { value: "" }, "Over…"), others.map(([name, words]) => el("option", { value: name }, words))) : null;
-    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), el("span", { class: "row end" }, another, exporter(`${output}-residual`, () => multiplesFigure(found)))), grid);
+    fill(box, el("header", {}, el("h2", {}, "Residual against each variable", el("span", { class: "note" }, ` ${found.unit}`)), el("span", { class: "note", id: "brush" }, "share of variance"), el("span", { class: "row end" }, another, exporter(`${output}-residual`, () => multiplesFigure(found)))), grid);
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });

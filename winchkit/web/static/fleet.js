@@ -32,6 +32,9 @@ export function update(fresh, before) {
 const day = (time) => new Date(1000 * time).toISOString().slice(0, 10);
 const words = (name) => name.replaceAll("-", " ").replaceAll("_", " ");
 const title = (own) => `${own.name}, ${words(own.parameter)}`;
+const heading = (winch, own) => `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`;
+// The winches of a kind with their effects, where they are few.
+const named = (fitted, count, fits) => (count <= 2 ? `: ${fitted.parameters.flatMap((own) => own.winches.filter(fits).map((winch) => heading(winch, own).replace(":", ","))).join("; ")}` : "");
 const many = (count, word) => `${count} ${word}${count === 1 ? "" : word.endsWith("ch") ? "es" : "s"}`;
 
 function render() {
@@ -41,7 +44,7 @@ function render() {
   busy();
   if (!fitted) { root.append(start()); return; }
   if (!picked) picked = first(fitted);
-  root.append(el("div", { class: "verdict" }, el("h1", {}, fitted.changed || fitted.odd ? [fitted.changed ? many(fitted.changed, "change") : null, fitted.odd ? `${many(fitted.odd, "winch")} that differ${fitted.odd === 1 ? "s" : ""} from the others` : null].filter(Boolean).join(", ") : fitted.nothing),
+  root.append(el("div", { class: "verdict" }, el("h1", {}, fitted.changed || fitted.odd ? [fitted.changed ? many(fitted.changed, "change") + named(fitted, fitted.changed, (w) => w.change) : null, fitted.odd ? `${many(fitted.odd, "winch")} that differ${fitted.odd === 1 ? "s" : ""} from the others` : null].filter(Boolean).join(", ") : fitted.nothing),
     el("p", {}, `${many(fitted.winches, "winch")}, ${many(fitted.sessions, "session")}, the same effects fitted to all; false discovery rate 1 % (${fitted.procedure}).${fitted.undetermined ? ` ${fitted.undetermined} estimates left out, which their runs leave open.` : ""}`)),
   el("div", { class: "grid" }, el("section", { class: "panel w8", "aria-label": "Fleet" }, fitted.parameters.map(drawGrid), scale()), el("section", { class: "panel w4", id: "series", "aria-label": "Estimates of a winch" })));
   for (const [name, reason] of Object.entries(fitted.failures)) root.append(el("p", { class: "note" }, `${name}: ${reason}`));
@@ -164,7 +167,7 @@ function drawSeries() {
   });
   parts.push(svg("text", { x: LEFT, y: H - 4, fill: "var(--muted)" }, day(whole[0])), svg("text", { x: W - 4, y: H - 4, "text-anchor": "end", fill: "var(--muted)" }, day(whole[1])));
   const drawn = svg("svg", { viewBox: `0 0 ${W} ${H}`, "font-size": 12, role: "img", "aria-label": `Estimates of ${winch.winch} over time` }, parts);
-  fill(box, el("header", {}, el("h2", {}, `${winch.winch}: ${own.name[0].toLowerCase()}${own.name.slice(1)}`), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), readable({ node: drawn, marks: known.map(([t, v, s]) => [X(t), Y(v), `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`]) }),
+  fill(box, el("header", {}, el("h2", {}, heading(winch, own)), el("span", { class: "note" }, `${words(own.parameter)}, ${own.unit}`)), readable({ node: drawn, marks: known.map(([t, v, s]) => [X(t), Y(v), `${day(t)}: ${number(v)} ± ${number(s, 2)} ${own.unit}`]) }),
     el("div", { class: "row" }, el("span", { class: "note" }, "± one standard deviation; dashed: common value"), drawingExporter(`${winch.winch}-${own.effect}`.replaceAll("/", "-"), `${winch.winch}: ${title(own)}`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), [["date", winch.times.map(day)], [`value [${own.unit}]`, winch.values], [`std [${own.unit}]`, winch.stds]])),
     winch.texts.map((text) => el("p", { class: "note" }, text)), winch.texts.length ? null : el("p", { class: "note" }, "No change, and no difference from the others."),
     el("div", { class: "buttons" }, el("button", { onclick: behind }, `Runs of ${day(winch.times[picked.s])}`)));

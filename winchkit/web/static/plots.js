@@ -167,7 +167,7 @@ export function readable({ node, marks }) {
 // One plot; `names` of its series and their `unit` are for the read-out.
 export function plot(host, data, series, { names = [], unit = "", height, xLabel = "", xUnit = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, left = 0, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
-  const flat = height < 130, shown = el("div", { class: "readout", hidden: true });
+  const flat = height < 150, shown = el("div", { class: "readout", hidden: true });
   const chosen = (u) => {
     if (u.select.width < 3) return;
     const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");

@@ -103,7 +103,7 @@ async function drawOver(view, output, boxes) {
     const range = sym(found.flatMap((own) => own.residual));
     found.forEach((own, i) => {
       const grid = el("div", { class: "multiples" }), tone = tones(view, output)[i];
-      boxes[i].replaceChildren(el("header", {}, el("h2", {}, `${"AB"[i]}: residual against each variable`), el("span", { class: "note" }, "share of variance")), grid);
+      boxes[i].replaceChildren(el("header", {}, el("h2", {}, `${"AB"[i]}: residual against each variable`, el("span", { class: "note" }, ` ${own.unit}`)), el("span", { class: "note" }, "share of variance")), grid);
       for (const name of names) {
         const pair = found.map((each) => each.panels.find((panel) => panel.variable === name)), panel = pair[i];
         if (!panel) continue;
