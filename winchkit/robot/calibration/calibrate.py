@@ -43,7 +43,7 @@ from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.calibration.swivel_axes import axes_text, reversed_axes
 from winchkit.robot.files.poses import MeasuredPoses, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.robot.identification.bundle_adjustment import BundleState, Solution, Weights
 from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import declared_instruments
 from winchkit.robot.identification.parameters import (
@@ -53,7 +53,7 @@ from winchkit.robot.identification.parameters import (
     parameters_of,
 )
 from winchkit.robot.identification.variance_components import START
-from winchkit.robot.mistakes.search import refuse_mistakes
+from winchkit.robot.mistakes.search import refuse_mistakes, refuse_slips
 from winchkit.schema.profiles.winch import LAYERED
 from winchkit.tabular import Columns, Tabular
 
@@ -272,11 +272,13 @@ def calibrate(
     for _ in range(_CLEANINGS):
         declared, chosen = fitted_with_instruments(equations.of(~wrong), options, progress)
         own = replace(chosen.equations, measured=fit)
-        before, wrong = wrong, gross_errors(own, chosen.solution.state.values, chosen.weights)
+        own_values = chosen.solution.state.values
+        before, wrong = wrong, gross_errors(own, own_values, chosen.weights)
         if np.array_equal(before, wrong):
             break
+    refuse_slips(own, BundleState(own_values, own.start(own_values)), chosen.weights)
     # Small rotations in another convention are hidden by the errors of the nominal geometry.
-    refuse_mistakes(chosen.equations.robot_at(chosen.solution.state.values), fit[~wrong])
+    refuse_mistakes(chosen.equations.robot_at(own_values), fit[~wrong])
     equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
     ratios = ratios_of(equations, solution)
