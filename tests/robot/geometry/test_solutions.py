@@ -81,7 +81,9 @@ def test_of_mirror_images_a_point_mass_hangs_in_the_lower_one() -> None:
     rng = np.random.default_rng(5)
     exits = np.array([[4.4, -1.9, 2.6], [-4.4, -2.0, 2.65], [-4.4, 1.9, 2.65], [4.4, 1.9, 2.6]])
     still = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    geometry = Geometry(exits, np.zeros((4, 3)), np.zeros(4), np.zeros((4, 3)) + [0, 0, 1], still)
+    geometry = Geometry(
+        exits, np.zeros((4, 3)), np.zeros(4), np.tile([0.0, 0.0, 1.0], (4, 1)), still
+    )
     position = rng.uniform([-3.5, -1.5, 0.0], [3.5, 1.5, 2.0], (300, 3))
     wanted = lengths(geometry, position, np.eye(3)[None]) + rng.standard_t(3, (300, 4)) * 3e-3
     start = Pose(position, np.tile(np.eye(3), (300, 1, 1)))
