@@ -26,7 +26,12 @@ from winchkit.fit_statistics import FitStatistics
 from winchkit.model.drum import drum_of
 from winchkit.rendering import Plotted
 from winchkit.robot.calibration.candidate_effects import CandidateEffect, candidates
-from winchkit.robot.calibration.identifiability import Observability, observability, refuse_unfit
+from winchkit.robot.calibration.identifiability import (
+    Observability,
+    observability,
+    refuse_unfit,
+    undetermined_move,
+)
 from winchkit.robot.calibration.notes import (
     home_notes,
     instrument_notes,
@@ -97,6 +102,9 @@ class Calibrated(Plotted, Tabular):
     """Run and row of the poses that were left out of the fit and of the held-out error."""
     reversed_axes: tuple[str, ...] = ()
     """Lines whose swivel axes point the other way than the profile has them."""
+    undetermined: float = 0.0
+    """Distance of the robot from the file's in combinations that the poses do not determine, in
+    standard deviations of the priors, where it is the larger part of the whole distance."""
     instrument_noise: Mapping[str, float] = field(default_factory=lambda: dict(START))
     """Standard deviations of the instruments by kind: known, else usual ones, SI."""
 
@@ -116,6 +124,13 @@ class Calibrated(Plotted, Tabular):
                 f"not calibrated: {lost} of {self.equations.count} equations have no value at the "
                 "end of the fit; nothing was written. Check the lines' order, gearbox.direction "
                 "and the units of the motor angles"
+            )
+        if self.undetermined:
+            yield (
+                f"not calibrated: points and radii end {self.undetermined:.0f} standard deviations "
+                "of their priors from the file's in combinations that the poses do not determine; "
+                "nothing was written. Check signs, units and the order of the motor angles; "
+                "measure more at each pose, such as positions, or record more poses"
             )
         before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
         if after >= before:
@@ -326,6 +341,7 @@ def calibrate(
         validation_lengths=lengths,
         ratios=ratios,
         unexplained=tuple(unexplained(equations, solution)),
+        undetermined=undetermined_move(given, equations, solution),
         reversed_axes=reversed_axes(chosen, options, progress),
         gross_errors=(*fit.place[wrong].tolist(), *validation.place[missed].tolist()),
         instrument_noise={**START, **(options.sigma or {})},

@@ -94,6 +94,9 @@ trackers (0.1 deg); a convention that changes no more is none of these mistakes.
 _REST_ANGLE = 0.1
 """Standard deviation, rad, of the rotation of a hanging platform about that in which it rests by
 the geometry of the file: points some centimetres off tilt a platform of decimetres by as much."""
+_CHANCE = 1e-6
+"""Probability of a slip by chance above which none is named: few poses have nearly as many
+parameters as equations, and a step explains any of them (rule of thumb)."""
 _SLIPPING = 6
 """Adjustments with the length that slipped, each with what the one before left (rule of thumb)."""
 _SETTLING = Iteration(damping=1e-6, relative_damping=1e-6, tolerance=1e-5, steps=25)
@@ -155,7 +158,7 @@ def refuse_slips(equations: RobotEquations, state: BundleState, weights: Weights
     measured = equations.measured
     placed = place(equations, state, weights)
     slip = slip_in(measured, linearise(equations, placed, weights), weights.sigma["closure"])
-    if slip is None:
+    if slip is None or slip.chance > _CHANCE:
         return
     mistake = slip_mistake(equations.robot_at(state.values), measured, slip)
     left = next(c.residual for kind, c in equations.constraints(placed) if kind == "closure")

@@ -42,6 +42,8 @@ class Slip:
     """m."""
     left: float
     """χ² without the slip, as a share."""
+    chance: float
+    """Probability of such a fall without a slip (F test, times the number of lines and rows)."""
 
 
 def slip_in(
@@ -49,6 +51,8 @@ def slip_in(
 ) -> Slip | None:
     """The slip that explains these poses; ``sigma`` of the closures, m. None where more than
     ``least`` of χ² is left without it."""
+    from scipy.special import fdtrc
+
     stack = linear.stack
     if "closure" not in stack.kinds or len(measured) < 2 * _ENDS:
         return None
@@ -59,6 +63,8 @@ def slip_in(
     by_poses = np.maximum(1 - np.sum(half[..., own] ** 2, axis=1), 0.0)
     inverse = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
     pull = inverse @ linear.gradient
+    freedom = float(np.count_nonzero(stack.known) - np.sum(half**2))
+    freedom -= float(np.sum(linear.information * inverse))
     before = float(np.sum(free**2) + linear.prior @ linear.prior - linear.gradient @ pull)
     found = None
     for run in np.unique(measured.run):
@@ -77,7 +83,10 @@ def slip_in(
         left = 1 - float(fall[first, line]) / max(before, np.finfo(float).tiny)
         if left <= least and (found is None or left < found.left):
             length = float(product[first, line] / square[first, line])
-            found = Slip(int(line), slice(int(rows[first]), int(rows[-1]) + 1), length, left)
+            ratio = (freedom - 1) * (1 - left) / max(left, np.finfo(float).eps)
+            chance = float(fdtrc(1, freedom - 1, ratio)) * fall.size if freedom > 1 else 1.0
+            to_the_end = slice(int(rows[first]), int(rows[-1]) + 1)
+            found = Slip(int(line), to_the_end, length, left, chance)
     return found
 
 
