@@ -36,6 +36,7 @@ from winchkit.robot.calibration.notes import (
     home_notes,
     instrument_notes,
     moved_points,
+    stretched_axis,
     warnings_of,
     worse_rotation,
 )
@@ -334,6 +335,7 @@ def calibrate(
             *home_notes(given, equations, values),
             *moved_points(given, equations, values),
             *warnings_of(equations, solution, weights, observed, after.unfound),
+            *stretched_axis(equations, solution, weights),
             *worse_rotation(errors_before, after),
             *unheld,
             *ratios.words,

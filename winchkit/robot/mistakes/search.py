@@ -157,7 +157,8 @@ def refuse_slips(equations: RobotEquations, state: BundleState, weights: Weights
     """Raise RunError where the slip of one cable explains what a fit leaves at these poses."""
     measured = equations.measured
     placed = place(equations, state, weights)
-    slip = slip_in(measured, linearise(equations, placed, weights), weights.sigma["closure"])
+    sigma = weights.sigma.get("closure", np.inf)
+    slip = slip_in(measured, linearise(equations, placed, weights), sigma)
     if slip is None or slip.chance > _CHANCE:
         return
     mistake = slip_mistake(equations.robot_at(state.values), measured, slip)

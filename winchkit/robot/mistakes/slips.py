@@ -1,14 +1,9 @@
 """A cable that slips, or a motor that loses its zero, between two rows of a table of poses.
 
 From one row of a run on, the cable of a line then differs from that by its motor angle by the same
-length. For every line and row this length is estimated beside the linearised fit, poses and
-parameters eliminated, with the χ² that it takes away; the largest is the slip. With the residuals e
-and the column z of a line, both without what poses explain, F the same of the parameters' columns,
-H the information with the priors and g the gradient,
-
-    N = Σ z·e − (Σ Fᵀz)ᵀ H⁻¹ g,    D = Σ z·z − (Σ Fᵀz)ᵀ H⁻¹ (Σ Fᵀz),    length N / D,  fall N² / D
-
-with sums over the rows from there to the end of the run.
+length. For every line and row this length is estimated beside the linearised fit
+(:mod:`winchkit.robot.mistakes.score`), the column being that of the line's closures from the row to
+the end of the run; the largest fall of χ² is the slip.
 """
 
 from __future__ import annotations
@@ -21,6 +16,7 @@ from winchkit.arrays import Array
 from winchkit.robot.files.poses import MeasuredPoses
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import ReducedEquations
+from winchkit.robot.mistakes.score import eliminated
 from winchkit.robot.mistakes.table import Mistake
 
 _ENDS = 3
@@ -51,41 +47,29 @@ def slip_in(
 ) -> Slip | None:
     """The slip that explains these poses; ``sigma`` of the closures, m. None where more than
     ``least`` of χ² is left without it."""
-    from scipy.special import fdtrc
-
     stack = linear.stack
-    if "closure" not in stack.kinds or len(measured) < 2 * _ENDS:
+    if "closure" not in stack.kinds:
         return None
-    own = stack.kinds["closure"]
-    half = linear.factor @ np.swapaxes(stack.by_pose, 1, 2)
-    free = stack.residual - (np.swapaxes(half, 1, 2) @ (half @ stack.residual[..., None]))[..., 0]
+    own, rest = stack.kinds["closure"], eliminated(linear)
     scale = stack.known[:, own] / sigma
-    by_poses = np.maximum(1 - np.sum(half[..., own] ** 2, axis=1), 0.0)
-    inverse = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
-    pull = inverse @ linear.gradient
-    freedom = float(np.count_nonzero(stack.known) - np.sum(half**2))
-    freedom -= float(np.sum(linear.information * inverse))
-    before = float(np.sum(free**2) + linear.prior @ linear.prior - linear.gradient @ pull)
+    by_poses = np.maximum(1 - np.sum(rest.half[..., own] ** 2, axis=1), 0.0)
     found = None
     for run in np.unique(measured.run):
         rows = np.flatnonzero(measured.run == run)
         if len(rows) < 2 * _ENDS:
             continue
-        columns = scale[rows, :, None] * linear.pose_free[rows, own]
-        across = _to_the_end(columns)
-        product = _to_the_end(scale[rows] * free[rows, own]) - across @ pull
-        square = _to_the_end(scale[rows] ** 2 * by_poses[rows])
-        square = square - np.einsum("rnq,qk,rnk->rn", across, inverse, across)
-        inside = slice(_ENDS, len(rows) - _ENDS + 1)
-        fall = np.zeros_like(square)
-        fall[inside] = product[inside] ** 2 / np.maximum(square[inside], np.finfo(float).eps)
-        first, line = np.unravel_index(int(np.argmax(fall)), fall.shape)
-        left = 1 - float(fall[first, line]) / max(before, np.finfo(float).tiny)
+        lengths, falls = rest.fall(
+            _to_the_end(scale[rows] * rest.residual[rows, own]),
+            _to_the_end(scale[rows] ** 2 * by_poses[rows]),
+            _to_the_end(scale[rows, :, None] * linear.pose_free[rows, own]),
+        )
+        falls[:_ENDS] = falls[len(rows) - _ENDS + 1 :] = 0.0
+        first, line = np.unravel_index(int(np.argmax(falls)), falls.shape)
+        fall = float(falls[first, line])
+        left = 1 - fall / max(rest.square, np.finfo(float).tiny)
         if left <= least and (found is None or left < found.left):
-            length = float(product[first, line] / square[first, line])
-            ratio = (freedom - 1) * (1 - left) / max(left, np.finfo(float).eps)
-            chance = float(fdtrc(1, freedom - 1, ratio)) * fall.size if freedom > 1 else 1.0
             to_the_end = slice(int(rows[first]), int(rows[-1]) + 1)
+            length, chance = float(lengths[first, line]), rest.chance(fall, falls.size)
             found = Slip(int(line), to_the_end, length, left, chance)
     return found
 
