@@ -60,7 +60,7 @@ def eliminated(linear: ReducedEquations) -> Eliminated:
     half = linear.factor @ np.swapaxes(stack.by_pose, 1, 2)
     residual = stack.residual[..., None]
     free = (residual - np.swapaxes(half, 1, 2) @ (half @ residual))[..., 0]
-    inverse = np.linalg.inv(linear.information + np.eye(len(linear.gradient)))
+    inverse = np.asarray(np.linalg.inv(linear.information + np.eye(len(linear.gradient))))
     pull = inverse @ linear.gradient
     square = float(np.sum(free**2) + linear.prior @ linear.prior - linear.gradient @ pull)
     freedom = float(np.count_nonzero(stack.known) - np.sum(half**2))
