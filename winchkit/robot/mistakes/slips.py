@@ -28,7 +28,7 @@ _DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True)
-class Slip:
+class CableSlip:
     """A cable that is longer from a row on than by its motor angle."""
 
     line: int
@@ -44,7 +44,7 @@ class Slip:
 
 def slip_in(
     measured: MeasuredPoses, linear: ReducedEquations, sigma: float, *, least: float = _LEFT
-) -> Slip | None:
+) -> CableSlip | None:
     """The slip that explains these poses; ``sigma`` of the closures, m. None where more than
     ``least`` of χ² is left without it."""
     stack = linear.stack
@@ -70,7 +70,7 @@ def slip_in(
         if left <= least and (found is None or left < found.left):
             to_the_end = slice(int(rows[first]), int(rows[-1]) + 1)
             length, chance = float(lengths[first, line]), rest.chance(fall, falls.size)
-            found = Slip(int(line), to_the_end, length, left, chance)
+            found = CableSlip(int(line), to_the_end, length, left, chance)
     return found
 
 
@@ -79,7 +79,7 @@ def _to_the_end(values: Array) -> Array:
     return np.asarray(np.cumsum(values[::-1], axis=0)[::-1])
 
 
-def slip_mistake(robot: Robot, measured: MeasuredPoses, slip: Slip) -> Mistake:
+def slip_mistake(robot: Robot, measured: MeasuredPoses, slip: CableSlip) -> Mistake:
     """The mistake that a slip is."""
     name, place = robot.names[slip.line], str(measured.place[slip.rows.start])
     longer = "longer" if slip.length > 0 else "shorter"
