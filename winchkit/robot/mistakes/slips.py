@@ -21,8 +21,8 @@ from winchkit.robot.mistakes.table import Mistake
 
 _ENDS = 3
 """Least rows before and after a slip: fewer are gross errors of single rows (rule of thumb)."""
-_LEFT = 0.25
-"""Most of χ² that is left without a slip: half of the misfit. Noise leaves 0.9 and more."""
+_LEFT = 0.4
+"""Most of χ² that is left without a slip (rule of thumb: noise alone leaves 0.97 and more)."""
 _DIFFERENCE = 1e-4
 """Step of a numerical derivative, rad: a cable's law is smooth over far larger angles."""
 
