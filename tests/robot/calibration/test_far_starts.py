@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robot_cases import shipped
 from robot_poses.mistaken import Scene, Table, profile_text, recorded
-from winchkit.robot import calibrate, robot_of
+from winchkit.robot import Pose, calibrate, robot_of
 from winchkit.robot.calibration.calibrate import Calibrated
 from winchkit.robot.calibration.prediction import rms
 from winchkit.robot.files.poses import read_poses
 from winchkit.runs import read_run
-from winchkit.schema.profiles.robot import LineSpec, RobotProfile
+from winchkit.schema.profiles.robot import HomeSpec, LineSpec, PlatformSpec, RobotProfile
 from winchkit.schema.read import read_robot
 
 SEED = 471
@@ -83,3 +84,24 @@ def test_lengths_at_home_are_found_in_an_unknown_frame(tmp_path: Path, robot: st
     assert rms(found.validation_after.distance) < 2 * FLOOR[robot]
     assert found.refusal == ""
     assert any("other cable lengths at home" in text for text in found.warnings)
+
+
+def test_what_no_pose_determines_stays_where_the_file_has_it(tmp_path: Path) -> None:
+    """A point mass on four cables, without positions: one spare length per pose. All motor angles
+    of the other sign led to exit points twenty metres away, which were written."""
+    given = shipped("hanging-4").profile
+    exits = ((0.0, -1.1, -0.1), (1.0, 0.55, -0.1), (-1.0, 0.55, -0.1), (0.0, 0.0, 2.9))
+    lines = tuple(
+        replace(line, exit_point=at, anchor_point=(0.0, 0.0, 0.0), swivel_radius=0.0)
+        for line, at in zip(given.line, exits, strict=True)
+    )
+    point = PlatformSpec(degrees_of_freedom=("x", "y", "z"))
+    home = HomeSpec((0.0, 0.0, 0.0))
+    robot = robot_of(replace(given, platform=point, line=lines, home=home))
+    position = np.random.default_rng(4).uniform([-0.5, -0.5, 0.1], [0.5, 0.5, 0.9], (10, 3))
+    angles = -robot.motor_angles(Pose(position, np.tile(np.eye(3), (10, 1, 1))))
+    rows = "\n".join(",".join(map(repr, row)) for row in angles.tolist())
+    run = tmp_path / "poses.csv"
+    run.write_text(",".join(f"{n}.motor_angle [rad]" for n in robot.names) + f"\n{rows}\n")
+    found = calibrate(robot, read_poses([read_run(run)], robot.profile))
+    assert "in combinations that the poses do not determine" in found.refusal

@@ -13,7 +13,7 @@ from robot_poses.mistaken import KINDS, Scene, mistake_of, profile_text, recorde
 from small_robots import RADIUS, RATIO, small_robot
 from winchkit.arrays import Array
 from winchkit.errors import RunError
-from winchkit.robot import robot_of
+from winchkit.robot import calibrate, robot_of
 from winchkit.robot.files.poses import MeasuredPoses, read_poses
 from winchkit.robot.mistakes.search import mistakes_in, refuse_mistakes
 from winchkit.runs import read_run
@@ -65,6 +65,21 @@ def test_signs_and_gon_of_rotations_are_named(
 ) -> None:
     table = recorded(SCENE)
     assert found(tmp_path, replace(table, angles=table.angles * factors).csv()) == [code]
+
+
+@pytest.mark.parametrize("oriented", [True, False])
+def test_a_cable_that_slips_is_named_with_its_row(oriented: bool, tmp_path: Path) -> None:
+    """Also where the fit would take it for noise."""
+    motor = recorded(SCENE).motor.copy()
+    motor[24:, 4] += 0.008 * RATIO / RADIUS
+    table = replace(recorded(SCENE), motor=motor, oriented=oriented)
+    run, path = written(tmp_path, table.csv())
+    profile = read_robot(path)
+    with pytest.raises(RunError) as refused:
+        calibrate(robot_of(profile), read_poses([read_run(run)], profile))
+    (fault,) = refused.value.faults
+    assert fault.key == "motor-slip:5"
+    assert f"from row 25 of {run} on the cable of line 5 is" in fault.message
 
 
 @pytest.mark.slow

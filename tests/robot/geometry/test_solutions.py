@@ -76,6 +76,21 @@ def test_the_mirrored_pose_of_a_flat_robot_is_reported(seed: int) -> None:
     assert np.isnan(forward(geometry, wanted, start).other.position).all()
 
 
+def test_of_mirror_images_a_point_mass_hangs_in_the_lower_one() -> None:
+    """Four cables from nearly one plane, with lengths that are some millimetres off."""
+    rng = np.random.default_rng(5)
+    exits = np.array([[4.4, -1.9, 2.6], [-4.4, -2.0, 2.65], [-4.4, 1.9, 2.65], [4.4, 1.9, 2.6]])
+    still = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    geometry = Geometry(
+        exits, np.zeros((4, 3)), np.zeros(4), np.tile([0.0, 0.0, 1.0], (4, 1)), still
+    )
+    position = rng.uniform([-3.5, -1.5, 0.0], [3.5, 1.5, 2.0], (300, 3))
+    wanted = lengths(geometry, position, np.eye(3)[None]) + rng.standard_t(3, (300, 4)) * 3e-3
+    start = Pose(position, np.tile(np.eye(3), (300, 1, 1)))
+    found = forward(geometry, wanted, start, tolerance=np.inf, search="outlying")
+    assert np.linalg.norm(found.pose.position - position, axis=1).max() < 0.2
+
+
 def test_a_cable_that_disagrees_leaves_no_pose_and_its_residual() -> None:
     robot = shipped("cabtive")
     wanted = robot.lengths(robot.home)

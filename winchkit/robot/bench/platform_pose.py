@@ -17,7 +17,8 @@ from winchkit.model.rotation import rotation_vector
 from winchkit.robot.bench.planner import Planner, coordinates_of, moved
 from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import quadratic
-from winchkit.robot.geometry.forward import AGREEMENT, PosesFound, distance
+from winchkit.robot.geometry.candidates import distance
+from winchkit.robot.geometry.forward import AGREEMENT, PosesFound
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.robot_bench import RobotWiring

@@ -26,11 +26,17 @@ from winchkit.fit_statistics import FitStatistics
 from winchkit.model.drum import drum_of
 from winchkit.rendering import Plotted
 from winchkit.robot.calibration.candidate_effects import CandidateEffect, candidates
-from winchkit.robot.calibration.identifiability import Observability, observability, refuse_unfit
+from winchkit.robot.calibration.identifiability import (
+    Observability,
+    observability,
+    refuse_unfit,
+    undetermined_move,
+)
 from winchkit.robot.calibration.notes import (
     home_notes,
     instrument_notes,
     moved_points,
+    stretched_axis,
     warnings_of,
     worse_rotation,
 )
@@ -43,7 +49,7 @@ from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.calibration.swivel_axes import axes_text, reversed_axes
 from winchkit.robot.files.poses import MeasuredPoses, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.robot.identification.bundle_adjustment import BundleState, Solution, Weights
 from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import declared_instruments
 from winchkit.robot.identification.parameters import (
@@ -53,7 +59,7 @@ from winchkit.robot.identification.parameters import (
     parameters_of,
 )
 from winchkit.robot.identification.variance_components import START
-from winchkit.robot.mistakes.search import refuse_mistakes
+from winchkit.robot.mistakes.search import refuse_mistakes, refuse_slips
 from winchkit.schema.profiles.winch import LAYERED
 from winchkit.tabular import Columns, Tabular
 
@@ -97,6 +103,9 @@ class Calibrated(Plotted, Tabular):
     """Run and row of the poses that were left out of the fit and of the held-out error."""
     reversed_axes: tuple[str, ...] = ()
     """Lines whose swivel axes point the other way than the profile has them."""
+    undetermined: float = 0.0
+    """Distance of the robot from the file's in combinations that the poses do not determine, in
+    standard deviations of the priors, where it is the larger part of the whole distance."""
     instrument_noise: Mapping[str, float] = field(default_factory=lambda: dict(START))
     """Standard deviations of the instruments by kind: known, else usual ones, SI."""
 
@@ -116,6 +125,13 @@ class Calibrated(Plotted, Tabular):
                 f"not calibrated: {lost} of {self.equations.count} equations have no value at the "
                 "end of the fit; nothing was written. Check the lines' order, gearbox.direction "
                 "and the units of the motor angles"
+            )
+        if self.undetermined:
+            yield (
+                f"not calibrated: points and radii end {self.undetermined:.0f} standard deviations "
+                "of their priors from the file's in combinations that the poses do not determine; "
+                "nothing was written. Check signs, units and the order of the motor angles; "
+                "measure more at each pose, such as positions, or record more poses"
             )
         before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
         if after >= before:
@@ -272,11 +288,13 @@ def calibrate(
     for _ in range(_CLEANINGS):
         declared, chosen = fitted_with_instruments(equations.of(~wrong), options, progress)
         own = replace(chosen.equations, measured=fit)
-        before, wrong = wrong, gross_errors(own, chosen.solution.state.values, chosen.weights)
+        own_values = chosen.solution.state.values
+        before, wrong = wrong, gross_errors(own, own_values, chosen.weights)
         if np.array_equal(before, wrong):
             break
+    refuse_slips(own, BundleState(own_values, own.start(own_values)), chosen.weights)
     # Small rotations in another convention are hidden by the errors of the nominal geometry.
-    refuse_mistakes(chosen.equations.robot_at(chosen.solution.state.values), fit[~wrong])
+    refuse_mistakes(chosen.equations.robot_at(own_values), fit[~wrong])
     equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
     ratios = ratios_of(equations, solution)
@@ -317,6 +335,7 @@ def calibrate(
             *home_notes(given, equations, values),
             *moved_points(given, equations, values),
             *warnings_of(equations, solution, weights, observed, after.unfound),
+            *stretched_axis(equations, solution, weights),
             *worse_rotation(errors_before, after),
             *unheld,
             *ratios.words,
@@ -324,6 +343,7 @@ def calibrate(
         validation_lengths=lengths,
         ratios=ratios,
         unexplained=tuple(unexplained(equations, solution)),
+        undetermined=undetermined_move(given, equations, solution),
         reversed_axes=reversed_axes(chosen, options, progress),
         gross_errors=(*fit.place[wrong].tolist(), *validation.place[missed].tolist()),
         instrument_noise={**START, **(options.sigma or {})},

@@ -13,6 +13,7 @@ from winchkit.robot.calibration.selection import BEYOND_PRIOR, POINTS, FitEnd
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
 from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.parameters import EFFECTS
+from winchkit.robot.mistakes.score import eliminated
 
 _NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _WORSE_ROTATION = 1.5
@@ -20,6 +21,9 @@ _WORSE_ROTATION = 1.5
 _ODD_ROTATION = 0.01
 """Standard deviation of rotations above which a warning is due, rad: five times that of a usual
 tracker's angles (rule of thumb)."""
+_STRETCHED, _STRETCH = 1e-6, 3e-3
+"""Probability by chance below which, and size from which on, a stretch of the positions along one
+axis is reported (rules of thumb: a right tracker and a right model have none above 0.1 %)."""
 _COARSE_RATIO = 5.0
 """Standard deviation of positions, in that of the exit points' prior, above which a warning is due
 (rule of thumb: a camera may be coarser than a drawing)."""
@@ -111,6 +115,33 @@ def moved_points(given: RobotEquations, fitted: RobotEquations, values: Array) -
                 f"the file's along an axis, whose prior has a standard deviation of "
                 f"{float(np.max(std)) * 1e3:.3g} mm: compare them with the robot"
             )
+
+
+def stretched_axis(
+    equations: RobotEquations, solution: Solution, weights: Weights
+) -> Iterator[str]:
+    """The axis of the positions along which these look longer or shorter, by a score test: neither
+    a frame nor a common scale of the tracker is so, and points and drums imitate it."""
+    linear, measured = solution.linear, equations.measured.position
+    if (own := linear.stack.kinds.get("position")) is None:
+        return
+    rest, known = eliminated(linear), linear.stack.known[:, own]
+    about = np.nan_to_num(measured - np.nanmean(measured, axis=0)) / weights.sigma["position"]
+    about = np.where(known, about, 0.0).T
+    by_poses = 1 - np.sum(rest.half[..., own] ** 2, axis=1).T
+    sizes, falls = rest.fall(
+        np.sum(about * rest.residual[:, own].T, axis=1),
+        np.sum(about**2 * by_poses, axis=1),
+        np.einsum("kp,pkq->kq", about, linear.pose_free[:, own]),
+    )
+    k = int(np.argmax(falls))
+    if rest.chance(float(falls[k]), len(falls)) < _STRETCHED and abs(sizes[k]) > _STRETCH:
+        longer = "longer" if sizes[k] < 0 else "shorter"
+        yield (
+            f"the positions are {longer} along {'xyz'[k]} than geometry and drums have them, by "
+            f"about {abs(sizes[k]):.1%} beside what points and drums took up: check the tracker's "
+            "calibration along this axis, or what an effect, such as elastic cables, moves"
+        )
 
 
 def worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:

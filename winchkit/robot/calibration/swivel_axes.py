@@ -27,10 +27,11 @@ from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import Mask, solve
 from winchkit.robot.identification.equations import RobotEquations, started
 
-_EVIDENCE = 45.0
-"""Difference of criteria from which axes are named: eight reversed ones give 90 to 160, and
-right ones were named at 10 to 20 (16 robots of a campaign), which is what a single reversed axis
-gives. Alone it cannot be distinguished from exit points, and does no harm."""
+_EVIDENCE, _POSES = 45.0, 90
+"""Difference of criteria from which axes are named, of so many poses: eight reversed ones give 90
+to 160, and right ones were named at 10 to 20 (16 robots of a campaign), which is what a single
+reversed axis gives. Alone it cannot be distinguished from exit points, and does no harm. Of more
+poses it is larger in proportion, as is that of two models which are both wrong."""
 
 
 def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) -> tuple[str, ...]:
@@ -50,7 +51,8 @@ def reversed_axes(best: FitEnd, options: Options, progress: ProgressCallback) ->
         if not found.with_prior < best.with_prior - DELTA_CHI_SQUARE:
             break
         best, turned = found, trial
-    if not best.with_prior < first.with_prior - _EVIDENCE * max(1.0, _of_points(best)):
+    least = _EVIDENCE * max(1.0, len(best.equations.measured) / _POSES)
+    if not best.with_prior < first.with_prior - least * max(1.0, _of_points(best)):
         return ()
     return tuple(name for name, own in zip(names, turned, strict=True) if own)
 

@@ -8,7 +8,9 @@ negative is slack, and its length is a bound and not an equation (active set).
 
 The squares of the lengths have local minima beside the pose. A pose whose lengths are not met is
 therefore searched from other starts: for each rotation of a lattice about the start, the position
-is fitted to the lengths, and the iteration begins at those that meet them best.
+is fitted to the lengths, and the iteration begins at those that meet them best. Of two poses that
+meet them as well, such as mirror images above and below the exit points, the one is preferred in
+which the cables can carry the platform's weight.
 """
 
 from __future__ import annotations
@@ -23,6 +25,15 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_by
+from winchkit.robot.geometry.candidates import (
+    BETTER,
+    RESOLUTION,
+    Candidates,
+    admit,
+    are_rivals,
+    distance,
+    prefer_carried,
+)
 from winchkit.robot.geometry.hessian import length_hessian
 from winchkit.robot.geometry.kinematics import (
     Geometry,
@@ -68,12 +79,6 @@ AGREEMENT = 0.02
 """Largest difference between given and geometric length at a pose, m: a larger one is a wrong
 reference, a slipped or a slack cable (rule of thumb: four standard deviations of the exit points'
 prior)."""
-RESOLUTION = 1e-8
-"""Difference of lengths, m, up to which they are met exactly: a hundred times the last step, below
-the resolution of any drum's encoder."""
-_BETTER = 3.0
-"""Ratio of two poses' residuals above which the pose with the smaller one is the solution: errors
-of the two spare lengths of eight cables have it by chance in one case of ten."""
 _SPACING, _WIDEST = 0.35, 1.6
 """Lattice of the starts' rotation vectors, rad: every rotation is within 0.3 rad of one, from where
 99 % of the iterations end in the solution of a robot with pulleys in space; a platform turned by
@@ -84,15 +89,11 @@ the rest is below what the lattice's spacing leaves (rule of thumb)."""
 _STARTS = 32
 """Starts of one pose: where exit points lie in a plane, half of them end in the solution, so that
 one pose in 4e9 is missed."""
-_USUAL, _OUTLYING = 0.1, 10.0
+_USUAL, _OUTLYING = 0.1, 2.5e-5
 """Quantile of the residuals of many poses that is the scale of their lengths' errors even where
-most are local minima, and its multiple from which on a residual stands out: of eight cables with
-normal errors, those of one pose in 4e4."""
+most are local minima, and share of poses with normal errors whose residual stands out."""
 _PIECE = 32
 """Poses whose starts are computed at once: 20 MB with eight cables."""
-_DISTINCT = 1e-2
-"""Distance, m and rad, from which on two poses are two solutions. Near a singular pose lengths of
-16 m are the same to `RESOLUTION` over 0.6 mm, the root of 2 · 16 m · 1e-8 m."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +143,8 @@ def forward(
     search : float or "outlying"
         Largest residual without a search from other starts, m: ``tolerance`` where the start is
         near the pose, negative for a search that also finds other solutions of every pose.
-        "outlying", for many poses of measured lengths, is ten times the residual that a tenth of
-        them have. Hanging platforms are not searched.
+        "outlying", for many poses of measured lengths, is the residual that errors of the size
+        that a tenth of them have exceed in one of 4e4. Hanging platforms are not searched.
 
     Returns
     -------
@@ -171,86 +172,34 @@ def forward(
     )
     search_all = _PoseSearch(geometry, given, platform if hanging else None)
     best, forces, taken = search_all.run(begin, steps)
-    other = _Candidates.none(many)
+    other = Candidates.none(many)
     if hanging and len(rows := np.flatnonzero(~np.isfinite(best.worst))):
         at = begin[rows]
         again, forces[rows], _ = _PoseSearch(geometry, given[rows], platform, _WEAK).run(at, steps)
         best.put(rows, again, np.ones(len(rows), dtype=bool))
     if not hanging:
-        limit = _outlying(best.worst) if search == "outlying" else search
+        spare = count - geometry.degrees
+        limit = _outlying(best.worst, spare) if search == "outlying" else search
         unmet = np.flatnonzero(np.all(np.isfinite(given), axis=1) & ~(best.worst <= limit))
         for first in range(0, len(unmet), _PIECE):
             rows = unmet[first : first + _PIECE]
             _search_further(geometry, given, begin, (best, other), rows, search=limit)
+        # A model's own errors reach further than normal ones.
+        most = BETTER * limit if search == "outlying" else limit
+        prefer_carried(geometry, platform or PlatformSpec(), (best, other), most)
     residual = given - lengths(geometry, best.position, best.rotation)
     converged = (best.worst <= tolerance) & np.isfinite(best.worst)
-    rivals = converged & (other.worst <= _BETTER * np.maximum(best.worst, RESOLUTION))
+    rivals = converged & are_rivals(best, other)
     forces[~converged] = np.nan
     found, second = best.pose_where(converged), other.pose_where(rivals)
     return PosesFound(found, converged, residual, second, forces, taken)
-
-
-@dataclass(frozen=True)
-class _Candidates:
-    """One pose of p where an iteration came to rest; the arrays are changed in place."""
-
-    position: Array
-    rotation: Array
-    worst: Array
-    """Largest residual, (p,), m; infinite without a pose."""
-    apart: Array
-    """Distance from the start, m and rad, (p,)."""
-
-    @classmethod
-    def none(cls, many: int) -> _Candidates:
-        """No pose yet."""
-        return cls(
-            np.full((many, 3), np.nan),
-            np.full((many, 3, 3), np.nan),
-            np.full(many, np.inf),
-            np.full(many, np.inf),
-        )
-
-    @property
-    def pose(self) -> Pose:
-        """The poses."""
-        return Pose(self.position, self.rotation)
-
-    def pose_where(self, good: NDArray[np.bool_]) -> Pose:
-        """The poses, NaN elsewhere."""
-        position = np.where(good[:, None], self.position, np.nan)
-        return Pose(position, np.where(good[:, None, None], self.rotation, np.nan))
-
-    def put(self, rows: NDArray[np.intp], other: _Candidates, which: NDArray[np.bool_]) -> None:
-        """Replace the poses of ``rows`` by those of ``which`` among as many others."""
-        for mine, theirs in zip(_arrays(self), _arrays(other), strict=True):
-            mine[rows[which]] = theirs[which]
-
-    def of(self, rows: NDArray[np.intp]) -> _Candidates:
-        """The poses of some rows."""
-        return _Candidates(*(mine[rows] for mine in _arrays(self)))
-
-    def before(self, other: _Candidates) -> NDArray[np.bool_]:
-        """Whether each is preferred: it meets the lengths better, or as well and is nearer."""
-        mine, theirs = np.maximum(self.worst, RESOLUTION), np.maximum(other.worst, RESOLUTION)
-        return np.asarray((mine < theirs) | ((mine == theirs) & (self.apart < other.apart)))
-
-
-def _arrays(found: _Candidates) -> tuple[Array, ...]:
-    return found.position, found.rotation, found.worst, found.apart
-
-
-def distance(one: Pose, other: Pose) -> Array:
-    """Distance of two poses and rotation from one to the other, added, m and rad, (p,)."""
-    turned = np.linalg.norm(one.rotation - other.rotation, axis=(1, 2)) / np.sqrt(2)
-    return np.asarray(np.linalg.norm(one.position - other.position, axis=1) + turned)
 
 
 def _search_further(
     geometry: Geometry,
     given: Array,
     start: Pose,
-    found: tuple[_Candidates, _Candidates],
+    found: tuple[Candidates, Candidates],
     rows: NDArray[np.intp],
     *,
     search: float,
@@ -273,23 +222,18 @@ def _search_further(
         for number in range(count):
             new = ends.of(np.arange(number, len(left) * count, count))
             new.apart[:] = distance(new.pose, begin[left])
-            _admit(new, best, other, rows[left])
+            admit(new, best, other, rows[left])
 
 
-def _admit(new: _Candidates, best: _Candidates, other: _Candidates, rows: NDArray[np.intp]) -> None:
-    """Put new candidates of some rows to the first or second place where they are preferred."""
-    old = best.of(rows)
-    distinct = ~(distance(new.pose, old.pose) <= _DISTINCT)
-    first = np.isfinite(new.worst) & new.before(old)
-    other.put(rows, old, first & distinct)
-    best.put(rows, new, first)
-    other.put(rows, new, distinct & ~first & new.before(other.of(rows)))
+def _outlying(worst: Array, spare: int) -> float:
+    """Residual that stands out among those of many poses with ``spare`` redundant lengths, m."""
+    from scipy.special import chdtri
 
-
-def _outlying(worst: Array) -> float:
-    """Residual that stands out among those of many poses, m."""
     usual = float(np.quantile(worst, _USUAL)) if len(worst) else 0.0
-    return max(_OUTLYING * usual, RESOLUTION) if np.isfinite(usual) else RESOLUTION
+    if not spare or not np.isfinite(usual):
+        return RESOLUTION
+    times = np.sqrt(chdtri(spare, _OUTLYING) / chdtri(spare, 1 - _USUAL))
+    return max(float(times) * usual, RESOLUTION)
 
 
 @lru_cache(maxsize=8)
@@ -346,7 +290,7 @@ class _PoseSearch:
     rank: float = _RANK
     """Share of the largest singular value below which one is zero, of a hanging platform."""
 
-    def run(self, start: Pose, steps: int) -> tuple[_Candidates, Array, int]:
+    def run(self, start: Pose, steps: int) -> tuple[Candidates, Array, int]:
         """Step all poses until each has converged or has failed; with the forces and the steps."""
         many = len(self.given)
         position, rotation = start.position.copy(), start.rotation.copy()
@@ -380,7 +324,7 @@ class _PoseSearch:
         # A slack cable is longer than the distance that it spans.
         size = np.where(cables.taut, np.abs(residual), -residual)
         worst = np.where(converged, np.max(size, axis=1), np.inf)
-        return _Candidates(position, rotation, worst, distance(there, start)), forces, taken
+        return Candidates(position, rotation, worst, distance(there, start)), forces, taken
 
     def _settle(
         self, at: Pose, forces: Array, cables: _Cables, which: NDArray[np.intp]

@@ -15,7 +15,8 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
-from winchkit.robot.geometry.forward import AGREEMENT, RESOLUTION, PosesFound, forward
+from winchkit.robot.geometry.candidates import RESOLUTION
+from winchkit.robot.geometry.forward import AGREEMENT, PosesFound, forward
 from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,

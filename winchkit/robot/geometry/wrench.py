@@ -1,10 +1,11 @@
-"""Wrench of the platform's weight, and its derivatives."""
+"""Wrench of the platform's weight, its derivatives, and whether cables can carry it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import cross, skew
@@ -12,6 +13,9 @@ from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
 _DOWN = np.array([0.0, 0.0, -GRAVITY])
+_CARRIED = 0.01
+"""Largest part of a weight that cables may leave and still carry it: above rounding and the errors
+of a geometry that is not calibrated (rule of thumb)."""
 
 
 def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
@@ -34,6 +38,26 @@ def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
     return np.concatenate([force, cross(lever, force)], axis=-1) * platform.free
+
+
+def is_carried(slope: Array, weight: Array) -> NDArray[np.bool_]:
+    """Whether cables, which only pull, can carry a weight.
+
+    Parameters
+    ----------
+    slope : (p, n, 6) array
+        Derivatives of the lengths by the pose.
+    weight : (p, 6) array
+        As of :func:`gravity_wrench`.
+
+    Returns
+    -------
+    (p,) array
+    """
+    from scipy.optimize import nnls
+
+    left = [nnls(a.T, w, maxiter=50 * len(a))[1] for a, w in zip(slope, weight, strict=True)]
+    return np.asarray(np.array(left) <= _CARRIED * np.linalg.norm(weight, axis=1))
 
 
 def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:

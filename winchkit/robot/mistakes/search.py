@@ -33,8 +33,16 @@ from winchkit.robot.geometry.kinematics import Pose, by_pose, lengths, linearise
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, reading_of, registered
+from winchkit.robot.identification.bundle_adjustment import (
+    BundleState,
+    Weights,
+    linearise,
+    place,
+)
+from winchkit.robot.identification.equations import RobotEquations
 from winchkit.robot.identification.instruments import InstrumentValues
 from winchkit.robot.mistakes.adjustment import ANGLE, adjusted, adjustment_of, misfit
+from winchkit.robot.mistakes.slips import slip_in, slip_mistake
 from winchkit.robot.mistakes.table import (
     MIRRORED,
     MOST_ROWS,
@@ -86,6 +94,11 @@ trackers (0.1 deg); a convention that changes no more is none of these mistakes.
 _REST_ANGLE = 0.1
 """Standard deviation, rad, of the rotation of a hanging platform about that in which it rests by
 the geometry of the file: points some centimetres off tilt a platform of decimetres by as much."""
+_CHANCE = 1e-6
+"""Probability of a slip by chance above which none is named: few poses have nearly as many
+parameters as equations, and a step explains any of them (rule of thumb)."""
+_SLIPPING = 6
+"""Adjustments with the length that slipped, each with what the one before left (rule of thumb)."""
 _SETTLING = Iteration(damping=1e-6, relative_damping=1e-6, tolerance=1e-5, steps=25)
 
 
@@ -107,6 +120,8 @@ class _Adjusted(_Trial):
     pose: Pose
     turned: Array
     """Turn of the tracker's frame, (3, 3)."""
+    end: tuple[RobotEquations, BundleState] | None = None
+    """Of the adjustment; None where lengths have no value."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +151,22 @@ class Named:
             f"{listed}: {what} differ by {far} as they are{rest} "
             f"(rms beside a free geometry); {'; '.join(cures)}"
         )
+
+
+def refuse_slips(equations: RobotEquations, state: BundleState, weights: Weights) -> None:
+    """Raise RunError where the slip of one cable explains what a fit leaves at these poses."""
+    measured = equations.measured
+    placed = place(equations, state, weights)
+    sigma = weights.sigma.get("closure", np.inf)
+    slip = slip_in(measured, linearise(equations, placed, weights), sigma)
+    if slip is None or slip.chance > _CHANCE:
+        return
+    mistake = slip_mistake(equations.robot_at(state.values), measured, slip)
+    left = next(c.residual for kind, c in equations.constraints(placed) if kind == "closure")
+    before = float(np.sqrt(np.nanmean(left**2)))
+    where = str(measured.place[slip.rows.start]).partition(" of ")[2]
+    named = Named(((mistake,),), before, before * slip.left**0.5, "m", where)
+    raise RunError([Fault(str(named), where, key=named.code)])
 
 
 def refuse_mistakes(robot: Robot, measured: MeasuredPoses) -> None:
@@ -198,9 +229,27 @@ class _MistakeSearch:
             if best[0].mistakes:
                 sets = tuple(trial.mistakes for trial in best)
                 yield Named(sets, plain.error, best[0].error, "m", self.place)
+            elif slipped := self._slipped(plain):
+                best = [slipped]
+                yield Named((slipped.mistakes,), plain.error, slipped.error, "m", self.place)
             elif plain.error > _WRONG * self.motion:
                 yield Named(((UNKNOWN,),), plain.error, 0.0, "m", self.place)
         yield from self._of_rotations(best[0])
+
+    def _slipped(self, plain: _Adjusted, *, turned: bool = False) -> _Adjusted | None:
+        """The trial without the slip of a cable, where this explains the table."""
+        best, slip = plain, None
+        for _ in range(_SLIPPING if len(plain.table) == len(self.measured) else 0):
+            assert best.end is not None, "lengths have values"
+            sigma = _SIGMA * self.motion
+            weights = Weights({"closure": sigma, "position": sigma, "rotation": ANGLE})
+            found = slip_in(best.table, linearise(*best.end, weights), sigma, least=1.0)
+            if found is None or (slip and (found.line, found.rows) != (slip.line, slip.rows)):
+                break
+            slip = replace(found, length=found.length + (slip.length if slip else 0.0))
+            mistake = slip_mistake(self.robot, self.measured, slip)
+            best = self._adjusted((mistake,), turned=turned)
+        return best if best.error * _FACTOR < plain.error else None
 
     def _best(self, plain: _Adjusted, usual: float) -> list[_Adjusted]:
         """Trials that explain the table best, by the fewest mistakes; ``plain`` where none does."""
@@ -357,7 +406,8 @@ class _MistakeSearch:
         assert own is not None, "they have the tracker"
         frame = rotation_by(own.trackers[0].turn)
         error = misfit(equations, solution, sigma)
-        return _Adjusted(mistakes, error, table, solution.state.pose, frame)
+        end = equations, solution.state
+        return _Adjusted(mistakes, error, table, solution.state.pose, frame, end)
 
     def _of_rotations(self, best: _Adjusted) -> Iterator[Named]:
         """Mistakes of the rotations beside the poses of the adjusted table."""
@@ -395,7 +445,11 @@ class _MistakeSearch:
         spread = rotation_vector(best.pose.rotation @ mean_rotation(best.pose.rotation).T)
         turns = float(np.median(np.linalg.norm(spread, axis=1)))
         if not best_set[0].mistakes and plain.error > max(_UNLIKE * turns, _LEAST_ANGLE):
-            yield Named(((UNKNOWN_ROTATIONS,),), plain.error, 0.0, "rad", self.place)
+            whole = self._adjusted((), turned=True)
+            if slipped := self._slipped(whole, turned=True):
+                yield Named((slipped.mistakes,), whole.error, slipped.error, "m", self.place)
+            else:
+                yield Named(((UNKNOWN_ROTATIONS,),), plain.error, 0.0, "rad", self.place)
         if best_set[0].mistakes:
             sets = tuple(trial.mistakes for trial in best_set)
             yield Named(sets, plain.error, best_set[0].error, "rad", self.place)

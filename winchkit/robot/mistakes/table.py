@@ -158,7 +158,7 @@ UNKNOWN = Mistake(
     "poses-unlike",
     "motor angles and positions are not those of this robot",
     "no exchange, sign, shift, axis or unit alone or in pairs explains it: check that the rows "
-    "belong together, by the names of the points, and the profile",
+    "belong together, by the names of the points, that no cable slipped, and the profile",
     lambda m: m,
 )
 UNKNOWN_ROTATIONS = Mistake(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.robot.bench.wiring import robot_of_bench
-from winchkit.robot.geometry.forward import RESOLUTION
+from winchkit.robot.geometry.candidates import RESOLUTION
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.web.robot import pose_picture
 from winchkit.schema.bench import BenchSpec
