@@ -18,7 +18,12 @@ from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.requirements import with_inputs
 from winchkit.diagnosis.regression.conditioning import COLLINEAR_DELAY, collinearity
-from winchkit.diagnosis.regression.cross_validation import CERTAIN, held_out_rms
+from winchkit.diagnosis.regression.cross_validation import (
+    AT_NOISE,
+    CERTAIN,
+    excess,
+    held_out_rms,
+)
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
@@ -54,6 +59,15 @@ of the processor time and ends at 79 to 86 %."""
 _NAMING = (0.8, 1.0)
 """The same for the equivalence sets; measured: the rest."""
 
+_UNEXPLAINED = 0.5
+"""Share of the excess that is left of an output that no law explains; convention: above it the
+verdict is ``unknown``."""
+_LACK_OF_FIT = AT_NOISE**2 - 1.0
+"""Excess of an output that has a lack of fit."""
+_HIDES = 100.0
+"""Ratio of excesses from which an output hides another: scores follow the excess, and five
+candidates are fitted per step; rule of thumb."""
+
 
 def selection_engine(
     dataset: Dataset, catalogue: Catalogue, candidates: Iterable[Effect] | None = None
@@ -77,7 +91,49 @@ def search(
 ) -> tuple[TimeSeriesSelection, SelectionResult]:
     """Engine and result of the last selection, with its simplest laws; ``known`` gets the result of
     the profile alone before the search.
+
+    Where no law explains an output, its error of thousands of times the noise of its repeats hides
+    all that acts on the others: the search is made again with that error as its noise.
     """
+    found = _search(engine, catalogue, progress, known)
+    dataset = engine.regression.dataset
+    if not (unexplained := _unexplained(*found)):
+        return found
+    other = selection_engine(replace(dataset, unexplained=unexplained), catalogue)
+    return _search(other, catalogue, progress, lambda result: None)
+
+
+def _unexplained(engine: TimeSeriesSelection, result: SelectionResult) -> dict[str, float]:
+    """Outputs with repeats, and their noise, of which more than half of the excess is left, and a
+    hundred times that of another output with a lack of fit.
+    """
+    if not result.noise.from_repeats:
+        return {}
+    folds, noise = engine.folds(result.final, result.noise), result.noise.rms
+    before, after = (
+        {name: excess({name: rms}, noise) for name, rms in errors.items()}
+        for errors in (
+            held_out_rms(engine.regression, fitted, result.noise, folds)
+            for fitted in (result.initial_model, result.final)
+        )
+    )
+    lacking = [
+        left for name, left in after.items() if left > max(_LACK_OF_FIT, CERTAIN * before[name])
+    ]
+    return {
+        name: noise[name]
+        for name, left in after.items()
+        if left > _UNEXPLAINED * before[name] and left > _HIDES * min(lacking, default=np.inf)
+    }
+
+
+def _search(
+    engine: TimeSeriesSelection,
+    catalogue: Catalogue,
+    progress: ProgressCallback,
+    known: Callable[[SelectionResult], None],
+) -> tuple[TimeSeriesSelection, SelectionResult]:
+    """Engine and result of a search with the present weights."""
     result, rounded = _with_transitions(engine, catalogue, _Trials(progress, "fitting"), known)
     engine, catalogue = rounded or (engine, catalogue)
 

@@ -193,3 +193,13 @@ def test_of_many_columns_a_question_lists_the_first(tmp_path: Path) -> None:
         one for one in guess_columns(read_table(path)).questions if "no column is a ch" in one.text
     ]
     assert question.text.endswith("'signal_29' and 470 more")
+
+
+def test_a_column_in_the_unit_of_its_channel_is_taken_before_one_in_volts(tmp_path: Path) -> None:
+    """A test stand that writes the voltage of every sensor beside its quantity."""
+    head = "Time (ms),Force (V),Force (N),Displacement (V),Displacement (mm)\n"
+    found = used(tmp_path / "stand.csv", head + rows(1, 2, 3, 4))
+    assert {channel: found[channel].unit for channel in ("force", "position")} == {
+        "force": "N",
+        "position": "mm",
+    }

@@ -91,6 +91,9 @@ class Dataset:
     sanity: tuple[Finding, ...] = ()
     """Findings on the runs as recorded."""
     resolution: Mapping[str, float] = field(default_factory=dict)
+    unexplained: Mapping[str, float] = field(default_factory=dict)
+    """Outputs that no law explains, and the noise of their repeats, rms, SI: they are weighted by
+    what the candidates leave."""
     """Resolution (quantisation step) of every output and of the load at the full rate, rms over the
     runs, SI."""
     zeroed_anew: frozenset[str] = frozenset()

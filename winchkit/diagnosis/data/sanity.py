@@ -15,6 +15,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.consistency import INCONSISTENT
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import Inspection
+from winchkit.runs.sanity.quantisation import printed_resolution
 from winchkit.schema.profiles.winch import WinchProfile
 
 ALARMING = frozenset({"inverted-sign", "wrong-factor"})
@@ -62,12 +63,17 @@ def unrelated(outputs: Collection[str]) -> tuple[Finding, ...]:
 
 
 def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
-    """Resolution of every output and of the load, rms over the runs that have it, SI."""
+    """Resolution of every output and of the load, rms over the runs that have it, SI: their common
+    step, or that of the printed digits."""
     out = {}
     for name in (*OUTPUTS, "load"):
-        squares = [one.resolutions[name] ** 2 for one in inspected if name in one.run]
-        if squares:
-            out[name] = float(np.sqrt(np.mean(squares)))
+        steps = [
+            one.resolutions[name] or printed_resolution(one.run[name])
+            for one in inspected
+            if name in one.run
+        ]
+        if steps:
+            out[name] = float(np.sqrt(np.mean(np.square(steps))))
     return out
 
 

@@ -66,13 +66,16 @@ class TimeSeriesSelection(SelectionEngine):
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> BandNoise:
         """Noise from the contrasts of repeats; from the saturated model without repeats, and in the
-        bands without repeats: of an output that none has, or below their lowest frequency."""
+        bands without repeats: of an output that none has or no law explains, or below their lowest
+        frequency."""
         if not self.regression.replicates:
             return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
         offsets = jacobian[:, : self.regression.n_run_offsets]
         own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
         noise = noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
-        few = noise.dof < _LEAST_DOF
+        unexplained = self.regression.dataset.unexplained
+        few = np.array([output in unexplained for output, _, _ in self.regression.bands])
+        few |= noise.dof < _LEAST_DOF
         if not few.any():
             return noise
         beside = noise_saturated(self.regression, residual, jacobian, self.signatures.columns)

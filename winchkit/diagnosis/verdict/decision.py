@@ -210,11 +210,12 @@ def output_fits(
     before, held_before, leakage_before = first
     after, held_after, leakage_after = first if final is initial_model else errors(final)
     noise_leakage = leakage.noise(final[0].hypothesis)
-    known = noise.from_repeats
+    known, unexplained = noise.from_repeats, regression.dataset.unexplained
     p_values = engine.p_values(*final) if known else {}
+    p_values = {output: p for output, p in p_values.items() if output not in unexplained}
     source = dict.fromkeys(regression.outputs, "saturated fit" if known else "white noise")
     source |= dict.fromkeys(replicate_rms(regression, final[0].residual), "repeats")
-    size = noise.rms if known else white_noise(regression, final[0].residual)
+    size = {**noise.rms, **unexplained} if known else white_noise(regression, final[0].residual)
     if any(held_after[output] > AT_NOISE * size[output] for output in size):
         # What coarse samples of a fast motion add to the error is known, and no effect.
         sampled = engine.discretization_power(*final)

@@ -15,6 +15,7 @@ from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import ColumnTable, FileColumn, are_whole, clock_before
 from winchkit.runs.importing.units.known import COUNTS, SpelledUnit
 from winchkit.schema.linear_axis import rotary_name
+from winchkit.schema.mapping import CHANNEL_DIMENSIONS
 
 _MEASURED = {"actual", "act", "ist", "measured", "meas"}
 _PREFERRED = {*_MEASURED, "motor", "mot", "feedback", "fb", "estimate"}
@@ -102,14 +103,16 @@ class ChannelCandidate:
 
     @property
     def order(self) -> tuple[int, bool, bool, int]:
-        """Sort key: the best candidate first; one of an unknown unit (mm/mm) after the others."""
+        """Sort key: the best candidate first; one of an unknown unit (mm/mm) after the others, and
+        one of another dimension (the volts of a force) after those of the channel's."""
         words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
-        is_current = self.unit is not None and self.unit.dimension == "current"
+        own = CHANNEL_DIMENSIONS.get(self.channel.rpartition(".")[2])
+        is_other = own is not None and self.unit is not None and self.unit.dimension != own
         preference = len(words & _AVOIDED) - len(words & _PREFERRED)
         # Beside a measured torque, that of the feedback is the controller's.
         preference -= len(words & _MEASURED)
         is_foreign = bool(self.column.unit) and self.unit is None
-        return self.rank, is_foreign, is_current, preference
+        return self.rank, is_foreign, is_other, preference
 
 
 @dataclass

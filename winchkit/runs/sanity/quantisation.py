@@ -69,6 +69,11 @@ _SCALES = (0.99, 0.5, 0.2)
 """Quantiles of the differences up to which the three searches take them."""
 _MOST = 50_000
 """Samples that are searched: more add nothing to a step, and the search takes milliseconds."""
+_MOST_DIGITS = 7
+"""Significant digits of a printed value that are looked for: numbers of single precision have
+more, and no instrument resolves them."""
+_DECIMAL = 1e-13
+"""Rounding error of a decimal number and of its conversion to another unit; numerical."""
 _REFINEMENTS = 4
 """Steps of the refinement, which converges in two or three."""
 
@@ -95,6 +100,23 @@ def resolution(values: Array) -> float:
             least = 2 if _is_dithered(few) else _FEW_LEVELS
         if levels >= least:
             return step
+    return 0.0
+
+
+def printed_resolution(values: Array) -> float:
+    """Step, rms, of values (n,) printed with seven significant digits or fewer; 0 for others.
+
+    The step of such a value follows its magnitude, so that it is no common step of a channel:
+    1.00001 and 0.100001 beside each other, as the default of C++ streams and %g write them.
+    """
+    sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])[:_MOST]
+    if len(sizes) < _LEAST_DIFFERENCES:
+        return 0.0
+    decade = 10.0 ** np.floor(np.log10(sizes))
+    for digits in range(1, _MOST_DIGITS + 1):
+        steps = decade * 10.0 ** (1 - digits)
+        if np.all(np.abs(sizes / steps - np.round(sizes / steps)) < _DECIMAL * 10.0**digits):
+            return float(np.sqrt(np.mean(steps**2)))
     return 0.0
 
 
