@@ -23,7 +23,7 @@ if sys.dont_write_bytecode:
 from hypothesis import settings
 
 from stalls import LATE_CYCLES, StallWatch
-from winchkit.python_can import import_python_can
+from winchkit.extras import import_python_can
 
 # Threads of small matrices only spin, and take the processors of the other tests.
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):

@@ -76,7 +76,7 @@ def served(
         if not paced:
             patch.setattr("time.sleep", of_commands(clock.sleep, time.sleep))
             patch.setattr("time.monotonic", of_commands(clock.now, time.monotonic))
-        yield Served(live, live.write_bench_file(folder / "bench.toml"))
+        yield Served(live, live.write_bench_file(folder / "bench.toml", replace=True))
 
 
 def without_trip(bench: Served) -> Served:

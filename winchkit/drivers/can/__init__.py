@@ -4,6 +4,6 @@
 their watchdogs, ``tools`` scan and settings; ``process_value`` is an instrument after CiA 404.
 """
 
-from winchkit.python_can import import_python_can
+from winchkit.extras import import_python_can
 
 import_python_can()

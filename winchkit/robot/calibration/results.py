@@ -163,7 +163,7 @@ def _errors(found: Calibrated) -> Iterator[str]:
     if isfinite(found.noise_ratio):
         kind = "position" if isfinite(rms(after.distance)) else "closure"
         yield (
-            f"The held-out error is {found.noise_ratio:.2g} times the instruments' noise of "
+            f"Held out: {found.noise_ratio:.2g} times the instruments' noise of "
             f"{_shown(found.instrument_noise[kind], 'm')} (real robots: 5 to 20)."
         )
     yield (

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import Fault, FileError
-from winchkit.python_can import import_python_can
+from winchkit.extras import import_python_can
 from winchkit.schema.eds.eds import read_eds_text
 
 Key = tuple[int, int]

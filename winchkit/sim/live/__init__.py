@@ -3,6 +3,6 @@
 :mod:`~winchkit.sim.live.bench` assembles it and writes the bench file that opens it.
 """
 
-from winchkit.python_can import import_python_can
+from winchkit.extras import import_python_can
 
 import_python_can()
