@@ -76,6 +76,12 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "transition": ("rad/s", 0),
     },
     "motor-dahl": {"torque": ("N m", 0), "distance": ("rad", SHAPE)},
+    "motor-lugre": {
+        "torque": ("N m", 0),
+        "static_share": ("1", SHAPE),
+        "stribeck_speed": ("rad/s", SHAPE),
+        "distance": ("rad", SHAPE),
+    },
     "motor-cogging": {"amplitude": ("N m", 0), "phase": ("rad", SHAPE), "order": ("1", SHAPE)},
     "rotor-inertia": {"inertia": ("kg m^2", 0)},
     "torque-lag": {"time_constant": ("s", 0)},
@@ -90,6 +96,12 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "friction-growth": {"rate": ("N m/s", 0), "transition": ("rad/s", 0)},
     "friction-of-load": {"share": ("1", 0), "transition": ("rad/s", 0)},
     "friction-of-torque": {"share": ("1", 0), "transition": ("rad/s", 0)},
+    "friction-of-transmission": {
+        "share": ("1", 0),
+        "inertia_share": ("1", SHAPE),
+        "transition": ("rad/s", 0),
+    },
+    "torque-clipping": {"share": ("1", 0), "limit": ("N m", SHAPE)},
     "stribeck-of-load": {
         "share": ("1", 0),
         "stribeck_speed": ("rad/s", SHAPE),

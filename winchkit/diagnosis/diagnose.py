@@ -52,6 +52,7 @@ from winchkit.diagnosis.steps import (
     is_small,
     standing_of,
     steps_of,
+    with_dependences,
     with_standing,
 )
 from winchkit.diagnosis.verdict.compensation import with_compensations
@@ -356,7 +357,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         *refitted_steps(engine, found, file, outputs, spread),
         *_steps(engine, found, sets, outputs, known=known, spread=spread),
     )
-    steps = with_compensations(engine, found, file, steps)
+    steps = with_compensations(engine, found, file, with_dependences(engine, found, steps))
     where = _where(regression, found)
     verdict = verdict_of(
         outputs,

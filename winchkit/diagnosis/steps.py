@@ -185,6 +185,40 @@ def with_standing(
     )
 
 
+def with_dependences(
+    engine: SelectionEngine, result: SelectionResult, steps: Sequence[Step]
+) -> tuple[Step, ...]:
+    """Steps, the last of which are the additions; one that an uncertain step imitates is not
+    certain: where the others imitate a change to within a tenth, and not without the uncertain
+    ones, its values depend on whether these are there.
+    """
+    final, noise, regression = result.final, result.noise, engine.regression
+    first, offset = len(steps) - len(final.hypothesis.terms), engine.n_initial_terms
+    out, hypothesis = list(steps), final.hypothesis
+    own = range(len(steps) - (len(final.hypothesis.terms) - offset), len(steps))
+    near = [
+        place
+        for place in own
+        if steps[place].certain
+        and collinearity(regression, final, noise, place - first) > 1 / CERTAIN**2
+    ]
+    loose = [place for place in own if not steps[place].certain]
+    if not near or not loose:
+        return tuple(steps)
+    for place in reversed(loose):
+        hypothesis = hypothesis.without(place - first)
+    without = engine.refit(hypothesis, noise)
+    for place in near:
+        index = place - first - sum(other < place for other in loose)
+        if collinearity(regression, without, noise, index) > 1 / CERTAIN**2:
+            continue
+        others = ", ".join(steps[other].effects[0] for other in loose)
+        what = f"uncertain steps imitate it to within a tenth, its values depend on them: {others}"
+        doubts = (*steps[place].doubts, Doubt("depends", what))
+        out[place] = replace(steps[place], certain=False, doubts=doubts)
+    return tuple(out)
+
+
 _SERIOUS = frozenset(
     {
         "implausible",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.effects.location import GRID_OF_PLACES, window
 from winchkit.effects.presliding import START, Presliding, sliding_distance
 from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
@@ -176,6 +178,48 @@ MOTOR_DAHL = Effect(
     carry=FRICTION.carried,
     dynamics=FRICTION.dynamics,
 )
+
+
+def _motor_lugre_limit(torque: Array, at: At, values: Values) -> Array:
+    """F_c = c (1 + r exp(−(θ'/ω_s)²)), N m."""
+    fallen = np.exp(-((at.motor_rate / values["stribeck_speed"]) ** 2))
+    return values["torque"] * (1.0 + values["static_share"] * fallen)
+
+
+BRISTLES = Presliding("torque", _motor_lugre_limit, _motor_angle, _motor_dahl_stiffness)
+
+MOTOR_LUGRE = Effect(
+    id="motor-lugre",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),
+        Parameter(
+            "static_share", "1", null=0.5, typical=0.5, low=0.0, high=5.0, role="shape",
+            plausible=Plausible(0.0, 3.0, "friction at rest is up to four times that of sliding"),
+        ),
+        Parameter(
+            "stribeck_speed", "rad/s", null=5.0, typical=5.0, low=0.05, high=1e3,
+            role="shape", grid=(4.0, 15.0),
+        ),
+        replace(sliding_distance("teeth, seals and bearings"), grid=(0.004, 0.016, 0.064)),
+        START,
+    ),
+    apply=BRISTLES.apply,
+    outputs=("motor_torque",),
+    reduces_to=("motor-dahl", "motor-coulomb"),
+    what="Teeth, seals and bearings deform before they slide, and slide easier at speed.",
+    formula="τ + F, dF/dθ = c/δ (1 − s F/g), g = c (1 + r exp(−(θ'/ω_s)²)); start: F/g at first",
+    source="LuGre model without damping (Canudas de Wit et al. 1995)",
+    looks_like="Presliding after a reversal, and a torque against the motion that falls with the "
+    "speed.",
+    confused_with=("motor-dahl", "motor-stribeck"),
+    told_apart="Small reversals, and slow ramps at several speeds.",
+    family="motor friction",
+    contains=("motor-coulomb", "motor-dahl", "motor-stribeck"),
+    memory=True,
+    carry=BRISTLES.carried,
+    dynamics=BRISTLES.dynamics,
+)  # fmt: skip
 
 
 def _friction_at_place(torque: Array, at: At, values: Values) -> Array:
