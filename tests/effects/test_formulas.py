@@ -375,6 +375,7 @@ OWN_TESTS = {
     "gear-dahl",
     "pulley-dahl",
     "motor-dahl",
+    "motor-lugre",
     "length-time-offset",
     "drum-winding-tension",
     "torque-lead",
