@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi
+from math import cos, exp, pi
 
 import numpy as np
 import pytest
@@ -57,24 +57,32 @@ def test_dahl_friction_follows_its_differential_equation() -> None:
     assert np.ptp(found) > 10
 
 
-def test_presliding_of_the_motor_follows_its_differential_equation() -> None:
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_presliding_of_the_motor_follows_its_differential_equation(share: float) -> None:
+    """A share of static friction falls with the speed over 2 rad/s."""
     profile = profile_with("grooved")
     time = np.linspace(0, 4, 2001)
     signals = Signals(time, 2.0 * np.sin(2.0 * time), load=np.full_like(time, 300.0))
     line = Line(profile)
     values = {"torque": 0.05, "distance": 0.7, "start": -0.4}
     motion = line.motion(signals)
-    found = predict(profile, motion, CATALOGUE["motor-dahl"], values)["motor_torque"]
+    effect = CATALOGUE["motor-lugre" if share else "motor-dahl"]
+    if share:
+        values |= {"static_share": share, "stribeck_speed": 2.0}
+    found = predict(profile, motion, effect, values)["motor_torque"]
+
+    def limit(t: float) -> float:
+        return 0.05 * (1.0 + share * exp(-((4.0 * cos(2.0 * t) / 2.0) ** 2)))
 
     def rate(t: float, friction: np.ndarray) -> list[float]:
         moving = 4.0 * cos(2.0 * t)
-        return [moving * (0.05 - np.sign(moving) * float(friction[0])) / 0.7]
+        return [moving * 0.05 * (1.0 - np.sign(moving) * float(friction[0]) / limit(t)) / 0.7]
 
     solved = solve_ivp(
-        rate, (0, 4), [-0.4 * 0.05], t_eval=time, rtol=1e-9, atol=1e-9, max_step=0.005
+        rate, (0, 4), [-0.4 * limit(0.0)], t_eval=time, rtol=1e-9, atol=1e-9, max_step=0.005
     )
     added = found - line.predict(motion)["motor_torque"]
-    assert np.allclose(added, solved.y[0], atol=1e-5)
+    assert np.allclose(added, solved.y[0], atol=1e-4 if share else 1e-5)
 
 
 def test_presliding_of_a_gear_follows_its_differential_equation() -> None:
