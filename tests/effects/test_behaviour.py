@@ -66,6 +66,8 @@ LINEAR = {
     "load-friction-at-place",
     "cell-crosstalk",
     "cell-clipping",
+    "friction-of-transmission",
+    "torque-clipping",
 }
 
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)

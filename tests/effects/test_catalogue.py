@@ -93,6 +93,12 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "friction-growth": {"rate": ("N m/s", 0), "transition": ("rad/s", 0)},
     "friction-of-load": {"share": ("1", 0), "transition": ("rad/s", 0)},
     "friction-of-torque": {"share": ("1", 0), "transition": ("rad/s", 0)},
+    "friction-of-transmission": {
+        "share": ("1", 0),
+        "inertia_share": ("1", SHAPE),
+        "transition": ("rad/s", 0),
+    },
+    "torque-clipping": {"share": ("1", 0), "limit": ("N m", SHAPE)},
     "stribeck-of-load": {
         "share": ("1", 0),
         "stribeck_speed": ("rad/s", SHAPE),

@@ -348,6 +348,15 @@ CASES: dict[str, Case] = {
         lambda: {"motor_torque": X.T * X.arm * (1 + 0.04 * np.sin(5 * X.theta + 0.3))},
     ),
     "friction-of-load": ({"share": 0.2}, lambda: _torque(0.2 * X.sm * X.T * X.arm)),
+    # The profile of the tests has no inertia: in test_inertia_of_the_profile_is_transmitted.
+    "friction-of-transmission": (
+        {"share": 0.2, "inertia_share": 0.5},
+        lambda: _torque(0.2 * X.sm * X.T * X.arm),
+    ),
+    "torque-clipping": (
+        {"share": 0.8, "limit": 0.5},
+        lambda: {"motor_torque": 0.2 * X.T * X.arm + 0.8 * np.minimum(X.T * X.arm, 0.5)},
+    ),
     "friction-of-torque": (
         {"share": 0.2},
         # τ_m = τ + s μ τ_m under a positive torque.

@@ -20,7 +20,7 @@ Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
     "axis", "ungeared", "half_turn", "torque", "prediction", "cell",
-    "payloads",
+    "payloads", "inertia",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -39,6 +39,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "prediction": "the torque that another model predicts (--predicted)",
     "payloads": "load_mass in every run, of two sizes at least",
     "cell": "a load channel or load_mass, or a motor_torque that the tension predicts",
+    "inertia": "the inertia in the profile ([motor] inertia)",
 }
 """What an effect may need, in words: parts of the profile, channels, and range of motion."""
 Output = Literal["cable_length", "tension", "motor_torque"]
@@ -315,6 +316,21 @@ runs in motion are scanned for every order."""
 def with_gain(signal: Any, at: At, values: Values) -> Any:
     """A signal (n,) with the ``gain_error`` of its instrument; as ``apply`` of an effect."""
     return signal * (1.0 + values["gain_error"])
+
+
+def with_limit(signal: Any, at: At, values: Values) -> Any:
+    """A signal (n,) less a ``share`` of what is beyond a ``limit``; as ``apply`` of an effect."""
+    beyond = np.maximum(signal - values["limit"], 0.0) + np.minimum(signal + values["limit"], 0.0)
+    return signal - values["share"] * beyond
+
+
+LIMIT_SHARE = Parameter(
+    "share", "1", null=0.0, typical=0.5, low=0.0, high=1.0,
+    plausible=Plausible(0.0, 1.0, "one is a full stop"),
+)  # fmt: skip
+"""Share that is lost beyond a limit."""
+LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
+"""Shares of a signal's range at which a limit is first tried."""
 
 
 def order_per_turn(orders: tuple[float, ...], typical: float) -> Parameter:

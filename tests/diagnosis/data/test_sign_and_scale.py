@@ -26,15 +26,17 @@ FACTORS = {
     1000.0: "power of ten",
     1e-3: "power of ten",
     100.0: "power of ten",
-    9.80665: "kilograms",
-    1 / 9.80665: "kilograms",
-    2 * pi: "2π",
-    180 / pi: "degrees",
-    60.0: "60",
-    25.4: "inches",
-    4.4482: "pounds-force",
+    9.80665: "kilogram",
+    1 / 9.80665: "kilogram",
     2.0**15: "counts",
 }
+OF_TENSION = {
+    2 * pi: "2π", 180 / pi: "degrees", 60.0: "60", 25.4: "inches", 4.4482: "pounds-force",
+}  # fmt: skip
+OF_TORQUE = {
+    4.4482: "no known constant", 60.0: "no known constant", 8.8507: "inch-pounds",
+    1 / 0.0070615: "inch-ounces", 10.197: "kilogram-force centimetres",
+}  # fmt: skip
 OUTPUTS = ("tension", "motor_torque")
 
 
@@ -56,8 +58,14 @@ def test_an_inverted_sign_is_named(seed: int, mass: float, stroke: float, name: 
     assert codes([scaled(run, name, -1.0)], SPIRAL) == [(name, "inverted-sign")]
 
 
-@pytest.mark.parametrize("name", OUTPUTS)
-@pytest.mark.parametrize(("factor", "words"), FACTORS.items())
+@pytest.mark.parametrize(
+    ("name", "factor", "words"),
+    [
+        (name, *item)
+        for name, own in zip(OUTPUTS, (OF_TENSION, OF_TORQUE), strict=True)
+        for item in (FACTORS | own).items()
+    ],
+)
 def test_a_wrong_unit_is_named(name: str, factor: float, words: str) -> None:
     (finding,) = sign_and_scale([scaled(made(3), name, factor)], GROOVED)
     assert (finding.channel, finding.code) == (name, "wrong-factor")
@@ -145,7 +153,7 @@ def test_a_unit_beside_an_effect_that_scatters_the_slopes_is_named(ripple: float
         runs.append(replace(with_channel(run, "motor_torque", torque), metadata={}))
     found = sign_and_scale(runs, GROOVED)
     assert [f.code for f in found] == ["wrong-factor"] * 2 * len(runs)
-    assert all("kilograms" in f.text for f in found)
+    assert all("kilogram" in f.text for f in found)
 
 
 def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:

@@ -436,13 +436,13 @@ def test_velocity_against_angle(change: Callable[[Array], Array], code: str, wor
 def test_a_velocity_is_in_no_unit_of_force() -> None:
     """0.981 is decanewtons and kilograms, 2.2 pounds, 25.4 inches."""
     for value in (0.981 * 0.75, 2.2046, 25.4):
-        assert not named_factor(Slope(value, 1e-3), is_angle=True)
+        assert not named_factor(Slope(value, 1e-3), "angle")
     assert "inches" in named_factor(Slope(25.4, 1e-3))
     assert named_factor(Slope(9.81, 0.01)) == "9.81: kilograms and newtons"
     both = named_factor(Slope(9.9, 0.1))
     assert "kilograms" in both
     assert "power of ten" in both
-    assert "rpm" in named_factor(Slope(60 / (2 * np.pi), 1e-3), is_angle=True)
+    assert "rpm" in named_factor(Slope(60 / (2 * np.pi), 1e-3), "angle")
 
 
 @pytest.mark.parametrize(("spread", "codes"), [(0.3, []), (0.05, ["inconsistent-velocity"])])

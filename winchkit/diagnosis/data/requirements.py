@@ -54,6 +54,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "torque": "motor_torque" in dataset.outputs,
         "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
         "payloads": None not in payloads and len(payloads) > 1,
+        "inertia": bool(profile.motor.inertia),
         "cell": any(r.raw.load is not None for r in recordings) or _tension_is_input(dataset),
     }
     lacking = [NEED_WORDS[need] for need in effect.needs if not have[need]]

@@ -31,7 +31,7 @@ from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.factors import KNOWN_FACTORS, Slope, named_factor, slope_text
+from winchkit.runs.sanity.factors import Slope, known_factors, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -80,7 +80,9 @@ def sign_and_scale(
     """
     wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
     every = _slopes(runs, profile, catalogue)
-    scattered = {name for name in OUTPUTS if _differ([own[name] for own in every if name in own])}
+    scattered = {
+        name for name in OUTPUTS if _differ(name, [own[name] for own in every if name in own])
+    }
     for run, own in zip(runs, every, strict=True):
         slopes = {name: slope for name, slope in own.items() if name not in scattered}
         for (channel, other), slope in _suspects(run, slopes).items():
@@ -89,7 +91,7 @@ def sign_and_scale(
     out = []
     for (channel, other, code), found in wrong.items():
         mean = _mean([slope for _, slope in found])
-        known = named_factor(mean) if _outside(abs(mean.value)) else ""
+        known = _known(channel, mean) if _outside(abs(mean.value)) else ""
         text = _text(channel, code, known, mean, other)
         out += [Finding(code, name, channel, slope.value, text) for name, slope in found]
     told = {f.run for f in out if f.channel == "motor_torque"}
@@ -107,7 +109,7 @@ def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
     if known := named_factor(Slope(slope, 0.0)):
         sign = "inverted sign and " if slope < 0 else ""
         return f"{sign}wrong factor or unit of {either}, {known}"
-    for factor in KNOWN_FACTORS:
+    for factor in known_factors():
         if abs(slope_at(factor) - 1) < _NEAR:
             known = named_factor(Slope(factor, 0.0))
             return f"wrong factor or unit of 'motor_angle', {known}"
@@ -128,10 +130,15 @@ def mending_column(finding: Finding) -> str:
     sign = "-" if finding.code == "inverted-sign" else ""
     factor = ""
     if np.isfinite(slope) and _outside(abs(slope)):
-        exact = min(KNOWN_FACTORS, key=lambda known: abs(known * abs(slope) - 1))
+        exact = min(known_factors(dimension), key=lambda known: abs(known * abs(slope) - 1))
         wrong = abs(exact * abs(slope) - 1) < _NEAR
         factor = f"*{exact if wrong else 1 / abs(slope):.4g}"
     return f"{channel}={sign}{channel}{factor} [{next(iter(UNITS[dimension]))}]"
+
+
+def _known(channel: str, slope: Slope) -> str:
+    """Known constants that a channel may be wrong by, in words; else empty."""
+    return named_factor(slope, column_dimension(channel) or "")
 
 
 def _outside(size: float) -> bool:
@@ -227,14 +234,14 @@ def _is_wrong(slope: Slope) -> bool:
     return slope.value < 0 or is_factor
 
 
-def _differ(slopes: Sequence[Slope]) -> bool:
+def _differ(channel: str, slopes: Sequence[Slope]) -> bool:
     """Whether the slopes that are not wrong differ from run to run, or the units of the others.
 
     Two units, with slopes that differ beyond their uncertainty, are no unit but a missing effect.
     Runs that are not wrong beside wrong ones have a slope near one.
     """
     wrong = sorted((s for s in slopes if _is_wrong(s)), key=lambda slope: abs(slope.value))
-    units = {known for slope in wrong if (known := named_factor(slope))}
+    units = {known for slope in wrong if (known := _known(channel, slope))}
     if len(units) > 1:
         low, high = wrong[0], wrong[-1]
         excess = abs(high.value) - _EQUAL * abs(low.value)

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, pi
 
+from winchkit.diagnosis.regression.cross_validation import CERTAIN
 from winchkit.diagnosis.results import Doubt, Estimate, Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
@@ -77,7 +78,9 @@ def _other_models(
 
 
 def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:
-    """A step whose intervals contain its values in the models that differ in another step."""
+    """A step whose intervals contain its values in the models that differ in another step; it is
+    not certain where they differ by a tenth of the value.
+    """
     effect = step.effects[0]
     values, farthest = dict(step.parameters[effect]), (1.0, "")
     for model in models:
@@ -95,7 +98,17 @@ def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:
     if not farthest[1]:
         return step
     doubts = (*step.doubts, Doubt("depends", farthest[1]))
-    return replace(step, parameters={**step.parameters, effect: values}, doubts=doubts)
+    known = all(
+        estimate.std <= CERTAIN * abs(estimate.value)
+        for name, estimate in values.items()
+        if estimate is not step.parameters[effect][name] and not name.startswith("phase")
+    )
+    return replace(
+        step,
+        parameters={**step.parameters, effect: values},
+        doubts=doubts,
+        certain=step.certain and known,
+    )
 
 
 def _change(term: Term, name: str, own: Estimate) -> float:

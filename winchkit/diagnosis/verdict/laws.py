@@ -30,6 +30,7 @@ from winchkit.diagnosis.verdict.plausibility import implausible_value, plausible
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
+from winchkit.effects.transition import TRANSITION
 from winchkit.schema.profiles.winch import WinchProfile
 
 _SEEN = 1.5
@@ -101,8 +102,15 @@ def _fastest(engine: SelectionEngine) -> Mapping[str, float]:
 def _lost_share(
     engine: SelectionEngine, simpler: Fit, present: Fit, noise: BandNoise, index: int
 ) -> float:
-    """Share of the excess that a term explains, which a model with a simpler law leaves."""
-    without = engine.refit(present.hypothesis.without(index), noise)
+    """Share of the excess that a term explains, which a model with a simpler law leaves; with the
+    simpler laws beside it, where these were added: both are one friction.
+    """
+    terms, own = present.hypothesis.terms, present.hypothesis.terms[index].effect
+    hypothesis = present.hypothesis
+    for place in reversed(range(engine.n_initial_terms, len(terms))):
+        if place == index or terms[place].effect.id in own.reduces_to:
+            hypothesis = hypothesis.without(place)
+    without = engine.refit(hypothesis, noise)
     folds = engine.folds(present, noise)
     left, now, whole = (
         excess(held_out_rms(engine.regression, fitted, noise, folds), noise.rms)
@@ -147,15 +155,17 @@ def reduced_law(
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
     It is determined where its interval of one standard deviation is above zero and ends before the
-    largest plausible value, and a speed is near those of the runs; a series where one of its
-    coefficients is.
+    largest plausible value, and a speed is near those of the runs and above the transition of the
+    reversal (below it the law is a part of that nuisance); a series where one of its coefficients
+    is.
     """
     shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
     if not shapes:
         return False
     if shape_at_bound(term) or any(implausible_value(p, values[p.name], profile) for p in shapes):
         return True
-    return not any(_is_determined(p, values[p.name], profile, fastest) for p in shapes)
+    turned = term.values.get(TRANSITION, 0.0)
+    return not any(_is_determined(p, values[p.name], profile, fastest, turned) for p in shapes)
 
 
 def _is_determined(
@@ -163,10 +173,12 @@ def _is_determined(
     estimate: Estimate,
     profile: WinchProfile | None,
     fastest: Mapping[str, float],
+    turned: float,
 ) -> bool:
     known = plausible_range(parameter, profile)
     size, high = abs(estimate.value), parameter.high if known is None else known[1]
-    is_seen = size <= _SEEN * fastest.get(parameter.unit, np.inf)
+    is_speed = parameter.unit in fastest
+    is_seen = not is_speed or turned <= size <= _SEEN * fastest[parameter.unit]
     return is_seen and estimate.std < min(size, high - size)
 
 

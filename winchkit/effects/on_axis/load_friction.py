@@ -1,7 +1,7 @@
 """Friction of an axis in proportion to the torque of its load: weight, springs and a cable.
 
-The inertia is no part of that torque: no recording of the motor shows which share of it the gear
-transmits, and which is the rotor's.
+The inertia is no part of that torque but in one law, which has the share of it that the gear
+transmits; the rest is the rotor's.
 """
 
 from __future__ import annotations
@@ -42,6 +42,42 @@ FRICTION_OF_LOAD = Effect(
     confused_with=("friction-of-torque", "motor-coulomb", "stribeck-of-load"),
     told_apart="Two loads in both directions, one of them near zero.",
     needs=("ungeared",),
+    family="load friction",
+    order=-1,
+)  # fmt: skip
+
+
+def _friction_of_transmission(torque: Array, at: At, values: Values) -> Array:
+    inertia = values["inertia_share"] * (at.profile.motor.inertia or 0.0)
+    transmitted = torque + inertia * at.motor_acceleration
+    return torque + values["share"] * motor_direction(at, values) * np.abs(transmitted)
+
+
+FRICTION_OF_TRANSMISSION = Effect(
+    id="friction-of-transmission",
+    stage=Stage.MOTOR,
+    parameters=(
+        _SHARE,
+        # An inertia of the profile that is too small makes the share larger than one.
+        Parameter(
+            "inertia_share", "1", null=1.0, typical=0.5, low=0.0, high=10.0,
+            role="shape", grid=(0.3, 1.0),
+        ),
+        MOTOR_TRANSITION,
+    ),
+    apply=_friction_of_transmission,
+    outputs=("motor_torque",),
+    reduces_to=("friction-of-load",),
+    what="Friction of teeth and bearings in proportion to the torque that they transmit to weight "
+    "and inertia.",
+    formula="τ + s μ |τ + λ J θ''|, τ the torque of the load, J the inertia of the profile",
+    source="load-dependent friction of robot joints (Bittencourt, Gunnarsson 2012), with the "
+    "inertia of the load",
+    looks_like="A step of the torque error with the direction, in proportion to the load, larger "
+    "where the axis accelerates.",
+    confused_with=("friction-of-load", "friction-of-torque", "motor-coulomb"),
+    told_apart="Fast moves where the weight is balanced; slow ones have the friction of the load.",
+    needs=("ungeared", "inertia"),
     family="load friction",
     order=-1,
 )  # fmt: skip

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
+from winchkit.effects.effect import (
+    LIMIT_SHARE,
+    LIMITS,
+    Effect,
+    Parameter,
+    Plausible,
+    Values,
+    with_gain,
+    with_limit,
+)
 from winchkit.model.stages import At, Stage
 
 
@@ -82,27 +89,17 @@ CELL_NONLINEARITY = Effect(
     on_robot=frozenset({"one"}),
 )
 
-_LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
-
-
-def _cell_clipping(tension: Array, at: At, values: Values) -> Array:
-    return tension - values["share"] * np.maximum(tension - values["limit"], 0.0)
-
-
 CELL_CLIPPING = Effect(
     id="cell-clipping",
     stage=Stage.CELL,
     parameters=(
-        Parameter(
-            "share", "1", null=0.0, typical=0.5, low=0.0, high=1.0,
-            plausible=Plausible(0.0, 1.0, "one is a full stop"),
-        ),
+        LIMIT_SHARE,
         Parameter(
             "limit", "N", null=300.0, typical=300.0, low=1e-3, high=1e7,
-            role="shape", grid=_LIMITS, over="tension",
+            role="shape", grid=LIMITS, over="tension",
         ),
     ),
-    apply=_cell_clipping,
+    apply=with_limit,
     outputs=("tension",),
     variable="load",
     what="The amplifier or the converter saturates; or a stop takes over a part of the force.",

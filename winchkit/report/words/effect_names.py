@@ -89,6 +89,10 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "friction in proportion to the torque",
         "the motor side has friction in proportion to the motor torque",
     ),
+    "friction-of-transmission": (
+        "friction in proportion to weight and inertia",
+        "the motor side has friction in proportion to the torque of weight and inertia",
+    ),
     "friction-growth": (
         "change of the friction with time",
         "the Coulomb friction of the motor side changes with time",
@@ -159,6 +163,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "Stribeck friction of the load",
         "the friction in proportion to the load is higher at low speed",
     ),
+    "torque-clipping": ("saturation of the torque", "the measurement of the torque saturates"),
     "torque-constant": (
         "torque constant of the drive",
         "the torque constant of the drive is wrong",

@@ -147,7 +147,7 @@ def _judged(run: Run, name: str, slope: Slope) -> Iterator[Finding]:
         yield Finding("inverted-sign", run.name, name, slope.value, text)
     margin = _SIGMAS * slope.std
     if abs(slope.value) + margin < _RANGE[0] or abs(slope.value) - margin > _RANGE[1]:
-        known = named_factor(slope, is_angle=True)
+        known = named_factor(slope, "angle")
         if known:
             text = f"the unit looks wrong: {beside}; that is {known}"
             yield Finding("wrong-factor", run.name, name, slope.value, text)
