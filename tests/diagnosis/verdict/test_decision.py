@@ -276,9 +276,9 @@ def test_an_addition_where_the_profile_leaves_no_error_above_the_noise_is_no_fin
     ("after", "p_value", "spread", "remaining"),
     [
         (1.01, 0.5, 0.05, ""),
-        (1.6, 0.5, 0.05, "more than a tenth"),
+        (1.6, 0.5, 0.05, "only in part"),
         (1.2, 0.5, 1.5, "too uncertain"),
-        (1.2, 1e-3, 0.05, "may be another one"),
+        (1.2, 1e-3, 0.05, "may fit better"),
         (1.02, 1e-3, 0.05, ""),
     ],
 )

@@ -126,8 +126,9 @@ def stretched_axis(
     if (own := linear.stack.kinds.get("position")) is None:
         return
     rest, known = eliminated(linear), linear.stack.known[:, own]
-    about = np.nan_to_num(measured - np.nanmean(measured, axis=0)) / weights.sigma["position"]
-    about = np.where(known, about, 0.0).T
+    seen = np.where(known, np.nan_to_num(measured), 0.0)
+    mean = seen.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    about = (np.where(known, seen - mean, 0.0) / weights.sigma["position"]).T
     by_poses = 1 - np.sum(rest.half[..., own] ** 2, axis=1).T
     sizes, falls = rest.fall(
         np.sum(about * rest.residual[:, own].T, axis=1),
