@@ -188,8 +188,7 @@ TORQUE_CLIPPING = Effect(
     id="torque-clipping",
     stage=Stage.TORQUE_SIGNAL,
     parameters=(
-        # A hard limit is no bound of the fit, at which its share would be held.
-        replace(LIMIT_SHARE, high=2.0, plausible=Plausible(0.0, 1.5, "one is a hard limit")),
+        replace(LIMIT_SHARE, plausible=Plausible(0.5, 1.0, "a limit lets less than half through")),
         Parameter(
             "limit", "N m", null=1.0, typical=1.0, low=1e-6, high=1e6,
             role="shape", grid=LIMITS, over="torque",
