@@ -211,13 +211,3 @@ def test_steady_torques_at_rest_say_nothing_of_the_friction(tmp_path: Path) -> N
         step = step_of(said, effect)
         assert step.parameters[effect][name].value == pytest.approx(value, rel=0.03)
     assert step_of(said, "joint-gravity").certain
-
-
-def test_values_that_change_by_one_factor_are_none_of_them_certain(tmp_path: Path) -> None:
-    """The torque reads 6 % low, and a spring that the weight imitates hides a part of it."""
-    motions = [swing(13, 1.0), swing(14, 1.0)]
-    runs = runs_of(motions, lambda s: 0.94 * (plain(s) + 0.022 * s.phi), repeats=1)
-    said = found(tmp_path, runs, FRICTION + GRAVITY)
-    refitted = [step for step in said.steps if step.refitted]
-    assert refitted
-    assert not any(step.certain for step in refitted)
