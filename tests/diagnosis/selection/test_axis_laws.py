@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -176,38 +175,3 @@ def test_a_stribeck_speed_within_the_reversal_is_no_step_beside_coulomb(tmp_path
         for values in step.parameters.values():
             assert all(e.std < 10 * abs(e.value) for e in values.values() if e.std == e.std)
         assert "undetermined" not in {doubt.code for doubt in step.doubts}
-
-
-def strokes(seed: int) -> Swing:
-    """Moves of a second and a half with half a second of rest after each."""
-    random = np.random.default_rng(seed)
-    share: Array = np.linspace(0.0, 1.0, 375)
-    ease = share**3 * (10 - 15 * share + 6 * share**2)
-    places = np.concatenate([[0.0], random.uniform(-1.2, 1.2, 12)])
-    parts = [
-        np.concatenate([a + (b - a) * ease, np.full(125, b)]) for a, b in pairwise(places.tolist())
-    ]
-    phi: Array = np.concatenate(parts)
-    time = 0.004 * np.arange(len(phi), dtype=np.float64)
-    theta = RATIO * phi
-    rate = np.gradient(theta, time)
-    return Swing(time, phi, theta, rate, np.gradient(rate, time))
-
-
-def test_steady_torques_at_rest_say_nothing_of_the_friction(tmp_path: Path) -> None:
-    """Static friction takes any share of its limit at each rest, until the next move."""
-
-    def torque(s: Swing) -> Array:
-        rests = np.abs(s.rate) < 1e-9
-        number = np.cumsum(np.diff(rests, prepend=False) > 0)
-        held = np.random.default_rng(4).uniform(-1, 1, number.max() + 1)[number]
-        return plain(s) + np.where(rests, COULOMB * held, 0.0)
-
-    said = found(tmp_path, runs_of([strokes(11), strokes(12)], torque), "")
-    for effect, name, value in (
-        ("motor-coulomb", "torque", COULOMB),
-        ("joint-gravity", "amplitude", WEIGHT),
-    ):
-        step = step_of(said, effect)
-        assert step.parameters[effect][name].value == pytest.approx(value, rel=0.03)
-    assert step_of(said, "joint-gravity").certain

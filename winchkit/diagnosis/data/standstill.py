@@ -1,11 +1,9 @@
 """Standstills at which the motor torque changes: static friction holds any torque below its limit.
 
 Where the angle does not change by more than its noise, no effect of the motion predicts a change of
-the torque: it is a reaction of static friction to the controller, and says nothing of its size. Of
-an axis it is never compared: steady torques at rest made the Coulomb friction of a joint 0.038 N m
-instead of 0.056 (0.06 was there), and one without any missing effect UNKNOWN. Of a winch, whose
-weight at rest is often most of a recording, it is not compared where it wanders, by von Neumann's
-ratio, as in stick-slip.
+the torque. The spread of the residual within standstills is then pure error, as that of repeats is.
+Where the torque wanders there, by von Neumann's ratio, as in stick-slip, it is a reaction of static
+friction to the controller and says nothing of the friction's size: it is not compared.
 
 References
 ----------
@@ -27,7 +25,6 @@ from winchkit.diagnosis.data.transients import white_noise
 from winchkit.model.line import Motion
 from winchkit.quantity_text import percent, quantity
 from winchkit.runs.sanity.finding import Finding
-from winchkit.schema.profiles.axis import AxisProfile
 
 STANDSTILL = "standstill"
 _LEAST_SAMPLES = 5
@@ -93,8 +90,8 @@ def spread_at_standstill(residual: Array, intervals: Sequence[slice]) -> tuple[f
 def standstill_mask(measured: Array, nominal: Array, motion: Motion) -> NDArray[np.bool_]:
     """Samples at standstills whose torque is a reaction of static friction.
 
-    There are none where hardly anything else is there, nor of a winch where the residual is as
-    steady at standstills as its noise.
+    There are none where the residual is as steady at standstills as its noise, or where hardly
+    anything else is there.
     """
     mask = np.zeros(len(measured), dtype=bool)
     for interval in _reactions(measured - nominal, motion)[0]:
@@ -107,8 +104,7 @@ def _reactions(residual: Array, motion: Motion) -> tuple[list[slice], float]:
     intervals = standstills(motion)
     within, noise = spread_at_standstill(residual, intervals)
     moving = len(residual) - sum(i.stop - i.start for i in intervals)
-    is_winch = not isinstance(motion.at.profile, AxisProfile)
-    if moving < _LEAST_MOVING or (is_winch and within <= _WANDERS * noise):
+    if within <= _WANDERS * noise or moving < _LEAST_MOVING:
         return [], 0.0
     return intervals, within
 
