@@ -67,7 +67,6 @@ LINEAR = {
     "cell-crosstalk",
     "cell-clipping",
     "friction-of-transmission",
-    "torque-clipping",
 }
 
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)

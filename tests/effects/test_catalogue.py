@@ -98,7 +98,6 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "inertia_share": ("1", SHAPE),
         "transition": ("rad/s", 0),
     },
-    "torque-clipping": {"share": ("1", 0), "limit": ("N m", SHAPE)},
     "stribeck-of-load": {
         "share": ("1", 0),
         "stribeck_speed": ("rad/s", SHAPE),

@@ -353,10 +353,6 @@ CASES: dict[str, Case] = {
         {"share": 0.2, "inertia_share": 0.5},
         lambda: _torque(0.2 * X.sm * X.T * X.arm),
     ),
-    "torque-clipping": (
-        {"share": 0.8, "limit": 0.5},
-        lambda: {"motor_torque": 0.2 * X.T * X.arm + 0.8 * np.minimum(X.T * X.arm, 0.5)},
-    ),
     "friction-of-torque": (
         {"share": 0.2},
         # τ_m = τ + s μ τ_m under a positive torque.

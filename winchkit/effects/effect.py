@@ -318,21 +318,6 @@ def with_gain(signal: Any, at: At, values: Values) -> Any:
     return signal * (1.0 + values["gain_error"])
 
 
-def with_limit(signal: Any, at: At, values: Values) -> Any:
-    """A signal (n,) less a ``share`` of what is beyond a ``limit``; as ``apply`` of an effect."""
-    beyond = np.maximum(signal - values["limit"], 0.0) + np.minimum(signal + values["limit"], 0.0)
-    return signal - values["share"] * beyond
-
-
-LIMIT_SHARE = Parameter(
-    "share", "1", null=0.0, typical=0.5, low=0.0, high=1.0,
-    plausible=Plausible(0.0, 1.0, "one is a full stop"),
-)  # fmt: skip
-"""Share that is lost beyond a limit."""
-LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
-"""Shares of a signal's range at which a limit is first tried."""
-
-
 def order_per_turn(orders: tuple[float, ...], typical: float) -> Parameter:
     """The parameter ``order``, tested at ``orders``; a free order would fit any periodic error."""
     return Parameter(

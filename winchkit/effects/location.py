@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +14,6 @@ from winchkit.model.variables import VARIABLES
 
 GRID_OF_PLACES = tuple((k + 0.5) / 12 for k in range(12))
 """Shares of the stroke at which a place is first tried; its width is then a twelfth of it."""
-_OVER: Mapping[str, Callable[[At], Array]] = {
-    **VARIABLES,
-    "torque": lambda at: np.abs(at.motor_torque),
-}
-"""Variables over whose range a grid is placed; of the measured torque its size."""
 _BELOW = 0.1
 """Smallest extent over that of the grid."""
 _SAMPLES = 2.0
@@ -64,9 +59,9 @@ def _located(parameter: Parameter, motions: Sequence[At]) -> Parameter:
     name = parameter.over or parameter.along
     if not name:
         return parameter
-    ranges = [_OVER[name](at) for at in motions]
-    low = min(float(np.nanmin(values)) for values in ranges)
-    extent = max(float(np.nanmax(values)) for values in ranges) - low
+    ranges = [VARIABLES[name](at) for at in motions]
+    low = min(float(np.min(values)) for values in ranges)
+    extent = max(float(np.max(values)) for values in ranges) - low
     origin = low if parameter.over else 0.0
     grid = (origin + share * extent for share in parameter.grid)
     within = tuple(x for x in grid if parameter.low < x < parameter.high)

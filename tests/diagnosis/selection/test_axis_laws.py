@@ -134,24 +134,6 @@ def test_friction_in_proportion_to_the_weight_alone_has_the_simpler_law(tmp_path
     assert step.parameters["friction-of-load"]["share"].value == pytest.approx(0.15, abs=0.01)
 
 
-def test_a_torque_that_saturates_before_its_noise_is_named(tmp_path: Path) -> None:
-    """No two values are equal: only the model shows where the record ends."""
-    runs = runs_of([swing(3, 0.9), swing(4, 0.9)], lambda s: np.clip(plain(s, 0.0), -0.1, 0.1))
-    said = found(tmp_path, runs, FRICTION)
-    step = step_of(said, "torque-clipping")
-    values = step.parameters["torque-clipping"]
-    assert step.certain
-    assert values["limit"].value == pytest.approx(0.1, rel=0.02)
-    assert values["share"].value == pytest.approx(1.0, abs=0.03)
-
-
-def test_nothing_saturates_where_nothing_does(tmp_path: Path) -> None:
-    said = found(
-        tmp_path, runs_of([swing(3, 0.9), swing(4, 0.9)], lambda s: plain(s, 0.0)), FRICTION
-    )
-    assert said.verdict == "adequate"
-
-
 def test_a_weight_that_an_uncertain_step_imitates_is_not_certain(tmp_path: Path) -> None:
     """With a ratio of 120 for 100 the weight is no sine of the angle: a spring mends its value."""
     motions = [swing(7, 1.2), swing(8, 1.2)]

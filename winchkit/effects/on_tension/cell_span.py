@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from winchkit.arrays import Array
-from winchkit.effects.effect import (
-    LIMIT_SHARE,
-    LIMITS,
-    Effect,
-    Parameter,
-    Plausible,
-    Values,
-    with_gain,
-    with_limit,
-)
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values, with_gain
 from winchkit.model.stages import At, Stage
 
 
@@ -89,17 +82,27 @@ CELL_NONLINEARITY = Effect(
     on_robot=frozenset({"one"}),
 )
 
+_LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
+
+
+def _cell_clipping(tension: Array, at: At, values: Values) -> Array:
+    return tension - values["share"] * np.maximum(tension - values["limit"], 0.0)
+
+
 CELL_CLIPPING = Effect(
     id="cell-clipping",
     stage=Stage.CELL,
     parameters=(
-        LIMIT_SHARE,
+        Parameter(
+            "share", "1", null=0.0, typical=0.5, low=0.0, high=1.0,
+            plausible=Plausible(0.0, 1.0, "one is a full stop"),
+        ),
         Parameter(
             "limit", "N", null=300.0, typical=300.0, low=1e-3, high=1e7,
-            role="shape", grid=LIMITS, over="tension",
+            role="shape", grid=_LIMITS, over="tension",
         ),
     ),
-    apply=with_limit,
+    apply=_cell_clipping,
     outputs=("tension",),
     variable="load",
     what="The amplifier or the converter saturates; or a stop takes over a part of the force.",

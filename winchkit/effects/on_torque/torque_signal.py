@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import (
-    LIMIT_SHARE,
-    LIMITS,
     MOTOR_ORDERS,
     Effect,
     Parameter,
@@ -17,7 +13,6 @@ from winchkit.effects.effect import (
     Values,
     order_per_turn,
     with_gain,
-    with_limit,
 )
 from winchkit.model.derivatives import shifted
 from winchkit.model.recurrence import first_order_lag
@@ -183,24 +178,3 @@ TORQUE_LEAD = Effect(
     confused_with=("torque-lag", "rotor-inertia"),
     told_apart="Fast moves under two loads, with the drive's actual and commanded torque.",
 )
-
-TORQUE_CLIPPING = Effect(
-    id="torque-clipping",
-    stage=Stage.TORQUE_SIGNAL,
-    parameters=(
-        replace(LIMIT_SHARE, plausible=Plausible(0.5, 1.0, "a limit lets less than half through")),
-        Parameter(
-            "limit", "N m", null=1.0, typical=1.0, low=1e-6, high=1e6,
-            role="shape", grid=LIMITS, over="torque",
-        ),
-    ),
-    apply=with_limit,
-    outputs=("motor_torque",),
-    what="The measurement of the torque saturates: range of a current sensor, scale of a record.",
-    formula="m − q (max(m − limit, 0) + min(m + limit, 0)); q = 1 is a hard limit",
-    source="saturation of amplifiers and converters",
-    looks_like="A torque that stays at one size, in both directions, where more is needed.",
-    confused_with=("torque-lag", "rotor-inertia"),
-    told_apart="Moves with half the acceleration; the range on the drive's data sheet.",
-    order=8,
-)  # fmt: skip

@@ -163,7 +163,6 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "Stribeck friction of the load",
         "the friction in proportion to the load is higher at low speed",
     ),
-    "torque-clipping": ("saturation of the torque", "the measurement of the torque saturates"),
     "torque-constant": (
         "torque constant of the drive",
         "the torque constant of the drive is wrong",
