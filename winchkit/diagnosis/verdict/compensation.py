@@ -124,7 +124,7 @@ def with_compensations(
 def _is_of_reversals(step: Step) -> bool:
     """Whether a refitted effect has its file's values, but for the transition at a reversal."""
     values = step.parameters[step.effects[0]]
-    return step.refitted and all(
+    return TRANSITION in step.file_values and all(
         abs(values[name].value - old) <= _AS_IN_FILE * values[name].std
         for name, old in step.file_values.items()
         if name != TRANSITION
