@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, pi
 
+from winchkit.diagnosis.regression.conditioning import collinearity
 from winchkit.diagnosis.regression.cross_validation import CERTAIN
 from winchkit.diagnosis.results import Doubt, Estimate, Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -28,6 +29,10 @@ _WIDER = 2.0
 """Standard deviations from which another model's value counts; convention: 95 %."""
 _SAME_CHANGE = 2.0
 """Ratio of two values above which the other step changes the same, and replaces this one."""
+_IMITATED = 1 / CERTAIN**2
+"""Variance inflation from which the others imitate an effect's change to within a tenth: what one
+that may be absent adds to its value is then most of what is known of it; measured: five right
+values have at most 3."""
 _MAY_BE_ABSENT = frozenset(
     {"small", "remaining", "collinear", "undetermined", "implausible", "not-converged"}
 )
@@ -42,6 +47,8 @@ class _OtherModel:
     """Place of that effect in the final model."""
     words: str
     terms: Mapping[str, Term]
+    is_smaller: bool = False
+    """Whether it lacks that effect, with nothing in its place."""
 
 
 def with_dependence(
@@ -53,7 +60,13 @@ def with_dependence(
     """Steps whose values contain those of the other models; the last are those of ``sets``."""
     models = list(_other_models(engine, result, sets, steps[len(steps) - len(sets) :]))
     ids = [term.effect.id for term in result.final.hypothesis.terms]
-    return tuple(_widened(step, ids.index(step.effects[0]), models) for step in steps)
+    out = []
+    for step in steps:
+        index = ids.index(step.effects[0])
+        imitated = collinearity(engine.regression, result.final, result.noise, index) > _IMITATED
+        own = [model for model in models if imitated or not model.is_smaller]
+        out.append(_widened(step, index, own))
+    return tuple(out)
 
 
 def _other_models(
@@ -74,7 +87,7 @@ def _other_models(
         if _MAY_BE_ABSENT & {doubt.code for doubt in step.doubts}:
             without = engine.refit(final.without(index), result.noise)
             terms = {t.effect.id: t for t in without.hypothesis.terms}
-            yield _OtherModel(index, f"without {own}", terms)
+            yield _OtherModel(index, f"without {own}", terms, is_smaller=True)
 
 
 def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:
