@@ -131,3 +131,10 @@ def test_a_drift_or_another_zero_is_no_step(shape: np.ndarray) -> None:
     runs = np.random.default_rng(4).standard_normal((3, 400))
     runs[1] += shape
     assert step_of(runs, 1) is None
+
+
+def test_repeats_without_common_samples_show_no_step() -> None:
+    runs = np.random.default_rng(5).standard_normal((3, 300))
+    for run, own in enumerate(np.array_split(np.arange(300), 3)):
+        runs[run, own] = np.nan
+    assert step_of(runs, 1) is None

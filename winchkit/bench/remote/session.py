@@ -105,7 +105,7 @@ def at_station(
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
 
-    with open_bench(spec, None, effects, name=name, realtime="try") as opened:
+    with open_bench(spec, effect_files=effects, name=name, realtime="try") as opened:
         station = LocalStation(opened, Client(name, observer=observer))
         try:
             yield station

@@ -121,7 +121,7 @@ def _execute(
         note(f"{place}: {step.words}")
 
     name = client_name("run")
-    with open_bench(bench, None, effects, name=name, realtime="try") as opened:
+    with open_bench(bench, effect_files=effects, name=name, realtime="try") as opened:
         return run_programme(
             opened, programme, out, ask, suffix=suffix, progress=report, replace=replace
         )

@@ -51,6 +51,9 @@ _LEAST_RATIO = 4.0
 is only noisier; screened: twice the rms."""
 _STEP = 0.2
 """Share of the variation of a difference beside a step, up to which it is one; rule of thumb."""
+_LEAST_COMMON = 64
+"""Samples that all repeats have, from which a step is looked for; as of a difference between them
+(:mod:`winchkit.diagnosis.data.zeroing`)."""
 _LEVEL = 1e-3
 """Level of the F test, Bonferroni over the repeats; convention."""
 
@@ -222,9 +225,12 @@ def step_of(errors: Array, index: int) -> tuple[int, float] | None:
     """
     others = np.delete(errors, index, axis=0)
     difference = errors[index] - others.mean(axis=0)
-    noise = np.nanvar(others - others.mean(axis=0)) * len(others) / (len(others) - 1)
     places = np.flatnonzero(np.isfinite(difference))
     values, count = difference[places], len(places)
+    if count < _LEAST_COMMON:
+        return None
+    others = others[:, places]
+    noise = np.var(others - others.mean(axis=0)) * len(others) / (len(others) - 1)
     before = np.arange(1, count)
     sums = np.cumsum(values)
     means = sums[:-1] / before, (sums[-1] - sums[:-1]) / (count - before)

@@ -18,6 +18,7 @@ from math import isfinite, pi
 
 from winchkit.diagnosis.regression.conditioning import collinearity
 from winchkit.diagnosis.regression.cross_validation import CERTAIN
+from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.results import Doubt, Estimate, Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
@@ -47,8 +48,6 @@ class _OtherModel:
     """Place of that effect in the final model."""
     words: str
     terms: Mapping[str, Term]
-    is_smaller: bool = False
-    """Whether it lacks that effect, with nothing in its place."""
 
 
 def with_dependence(
@@ -58,36 +57,47 @@ def with_dependence(
     steps: Sequence[Step],
 ) -> tuple[Step, ...]:
     """Steps whose values contain those of the other models; the last are those of ``sets``."""
-    models = list(_other_models(engine, result, sets, steps[len(steps) - len(sets) :]))
     ids = [term.effect.id for term in result.final.hypothesis.terms]
-    out = []
-    for step in steps:
-        index = ids.index(step.effects[0])
-        imitated = collinearity(engine.regression, result.final, result.noise, index) > _IMITATED
-        own = [model for model in models if imitated or not model.is_smaller]
-        out.append(_widened(step, index, own))
-    return tuple(out)
+    added = steps[len(steps) - len(sets) :]
+    models = list(_with_other_members(engine, result, sets))
+    index = {place: ids.index(step.effects[0]) for place, step in enumerate(steps)}
+    absent = [ids.index(step.effects[0]) for step in added if _may_be_absent(step)]
+    imitated = {
+        place
+        for place, own in index.items()
+        if set(absent) - {own}
+        and collinearity(engine.regression, result.final, result.noise, own) > _IMITATED
+    }
+    smaller = [_without(engine, result, own) for own in absent] if imitated else []
+    return tuple(
+        _widened(step, index[place], [*models, *smaller] if place in imitated else models)
+        for place, step in enumerate(steps)
+    )
 
 
-def _other_models(
-    engine: SelectionEngine,
-    result: SelectionResult,
-    sets: Sequence[EquivalenceSet],
-    added: Sequence[Step],
+def _may_be_absent(step: Step) -> bool:
+    return bool(_MAY_BE_ABSENT & {doubt.code for doubt in step.doubts})
+
+
+def _with_other_members(
+    engine: SelectionEngine, result: SelectionResult, sets: Sequence[EquivalenceSet]
 ) -> Iterator[_OtherModel]:
-    final = result.final.hypothesis
-    for index, (each, step) in enumerate(
-        zip(sets, added, strict=True), start=engine.n_initial_terms
-    ):
-        own = final.terms[index].effect.id
+    for index, each in enumerate(sets, start=engine.n_initial_terms):
+        own = result.final.hypothesis.terms[index].effect.id
         for term, fitted in zip(each.terms, each.fits, strict=True):
             if term.effect.id != own:
-                terms = {t.effect.id: t for t in fitted.hypothesis.terms}
-                yield _OtherModel(index, f"with {term.effect.id} in place of {own}", terms)
-        if _MAY_BE_ABSENT & {doubt.code for doubt in step.doubts}:
-            without = engine.refit(final.without(index), result.noise)
-            terms = {t.effect.id: t for t in without.hypothesis.terms}
-            yield _OtherModel(index, f"without {own}", terms, is_smaller=True)
+                words = f"with {term.effect.id} in place of {own}"
+                yield _OtherModel(index, words, _by_id(fitted))
+
+
+def _without(engine: SelectionEngine, result: SelectionResult, index: int) -> _OtherModel:
+    final = result.final.hypothesis
+    smaller = engine.refit(final.without(index), result.noise)
+    return _OtherModel(index, f"without {final.terms[index].effect.id}", _by_id(smaller))
+
+
+def _by_id(fitted: Fit) -> Mapping[str, Term]:
+    return {term.effect.id: term for term in fitted.hypothesis.terms}
 
 
 def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:

@@ -47,7 +47,7 @@ def run_robot(
     def report(repeat: int, number: int) -> None:
         note(f"{programme.name} {repeat}/{programme.repeat}, motion {number}")
 
-    with open_bench(bench, None, effects, name=client_name("run"), realtime="try") as opened:
+    with open_bench(bench, effect_files=effects, name=client_name("run"), realtime="try") as opened:
         written = run_robot_programme(
             opened, programme, folder, suffix=suffix, progress=report, replace_files=replace
         )
