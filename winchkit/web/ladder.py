@@ -31,7 +31,12 @@ from winchkit.report.words.steps import (
     step_text,
     step_title,
 )
-from winchkit.report.words.vocabulary import VERDICT_NAMES, effect_name, output_name
+from winchkit.report.words.vocabulary import (
+    VERDICT_NAMES,
+    effect_name,
+    name_and_id,
+    output_name,
+)
 from winchkit.web.words import page_text
 
 _SHOWN = 8
@@ -203,7 +208,7 @@ def card(
             }
             for name, e in values.items()
         ],
-        "equal": list(distinct),
+        "equal": [name_and_id(effect) for effect in distinct],
         "told_apart": effect.told_apart,
         "next": None
         if not runs

@@ -84,8 +84,9 @@ def test_laws_of_one_kind_are_named_once() -> None:
     stretch = replace(ELASTIC, effects=laws, law="open", doubts=(doubt,))
     assert step_text(stretch) == "the cable is elastic: EA = 249.9 ± 7.0 kN"
     assert doubt_texts(stretch) == [
-        "these runs cannot distinguish it from cable-elongation-exponential and "
-        "cable-elongation-quartic"
+        "these runs cannot distinguish it from exponential elongation of the cable "
+        "(cable-elongation-exponential) and quartic elongation of the cable "
+        "(cable-elongation-quartic)"
     ]
 
 
@@ -103,7 +104,8 @@ def test_signatures_far_apart_are_not_called_indistinguishable() -> None:
     assert alike(apart) == {}
     assert alike(FRICTION) == {"pulley-capstan": 0.002}
     assert doubt_texts(apart) == [
-        "these runs are explained as well by pulley-capstan, in another way"
+        "these runs are explained as well by capstan friction at a pulley (pulley-capstan), in "
+        "another way"
     ]
 
 

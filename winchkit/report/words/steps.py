@@ -17,6 +17,7 @@ from winchkit.report.words.vocabulary import (
     error_scale,
     kind,
     listed,
+    name_and_id,
     output_name,
     values_text,
     variable_name,
@@ -211,8 +212,9 @@ def alike(step: Step) -> dict[str, float]:
 
 
 def _alternatives(step: Step, data: str) -> list[str]:
-    same = list(alike(step))
-    others = [effect for effect in step.effects[1:] if effect not in same]
+    equal = alike(step)
+    same = [name_and_id(effect) for effect in equal]
+    others = [name_and_id(effect) for effect in step.effects[1:] if effect not in equal]
     out = [f"these {data} cannot distinguish it from {listed(same)}"] if same else []
     if others:
         out.append(f"these {data} are explained as well by {listed(others)}, in another way")
