@@ -34,6 +34,14 @@ def test_a_step_has_value_error_without_and_with_it_and_share() -> None:
     )
 
 
+def test_beside_an_output_far_off_the_share_of_the_one_that_falls_is_given() -> None:
+    outputs = OUTPUTS | {"tension": replace(AT_NOISE, heldout_rms_before=5e3)}
+    before = {"cable_length": NOISY.heldout_rms_before, "tension": 5e3}
+    after = before | {"cable_length": NOISY.noise_rms or 0.0}
+    text = step_text(replace(ELASTIC, share=1e-5), outputs, (before, after))
+    assert text.endswith("explains 100 % of its excess, under 0.1 % of all")
+
+
 def test_of_laws_that_overlap_the_first_explains_most_and_comes_first() -> None:
     """Friction and viscosity at one speed: each beside the other explains little."""
     first = replace(ELASTIC, share=0.03, explains=0.9)

@@ -28,6 +28,8 @@ _LOWERED = 1.01
 """Ratio of the errors before and after a step from which it lowers an output's error."""
 _LEAST = 1e-3
 """Share below which no figure is shown."""
+_TENTH = 0.1
+"""Share of the excess of one output from which it is said; the tenth of the verdict."""
 _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
@@ -173,15 +175,22 @@ def step_text(
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
+    Beside an output that is thousands of times its noise off, any share of all is small: the share
+    of the excess of that one output is said where it is a tenth and that of all is no figure.
     """
-    parts = [_titled_values(step)]
+    parts, there = [_titled_values(step)], 0.0
     if outputs and fall and (name := lowered_most(fall)):
         before, after = fall
         scale = error_scale(outputs[name])
         was = significant(before[name] / scale.worth)
         parts.append(f"{output_name(name)} {was} → {scale.text(after[name])}")
+        first, noise = outputs[name].heldout_rms_before, {name: outputs[name].noise_rms}
+        whole, *left = (excess({name: e}, noise) for e in (first, before[name], after[name]))
+        there = (left[0] - left[1]) / whole if whole else 0.0
     share = explained_share(step)
-    if isfinite(share):
+    if share < _LEAST and there >= _TENTH:
+        parts.append(f"explains {percent(min(1.0, there))} of its excess, {percent(share)} of all")
+    elif isfinite(share):
         parts.append(f"explains {percent(share) if share >= _LEAST else 'under 0.1 %'}")
     return "; ".join(parts)
 
