@@ -214,21 +214,20 @@ class RobotSelection:
         return FittedModel(self.engine.regression, self.result.final, self.result.noise)
 
     def explained(self, steps: Sequence[int]) -> list[float]:
-        """Share of the excess that each of these terms explains beside those before it: where a
-        frame and a reflector far off explain the same, neither explains much beside the other."""
+        """Share of the excess that each of these terms explains beside those before it and what is
+        always fitted: where a frame and a reflector far off explain the same, neither explains much
+        beside the other."""
         noise = {name: output.noise_rms for name, output in self.in_noise.items()}
         before = {name: output.heldout_rms_before for name, output in self.in_noise.items()}
-        part = self.final.fit.hypothesis
-        left: list[float] = []
-        for index in reversed(steps):
-            model = replace(self.final, fit=self.engine.refit(part, self.result.noise))
-            left.append(excess(errors_in_noise(model), noise))
-            part = part.without(index)
-        left.append(excess(before, noise))
-        left.reverse()
-        if not left[0] > 0.0:
+        part, whole = self.final.fit.hypothesis, excess(before, noise)
+        if not whole > 0.0:
             return [float("nan")] * len(steps)
-        return [float(np.clip((b - a) / left[0], 0.0, 1.0)) for b, a in pairwise(left)]
+        models = [self.final]
+        for index in reversed(steps):
+            part = part.without(index)
+            models.append(replace(self.final, fit=self.engine.refit(part, self.result.noise)))
+        left = [excess(errors_in_noise(model), noise) for model in reversed(models)]
+        return [float(np.clip((b - a) / whole, 0.0, 1.0)) for b, a in pairwise(left)]
 
     @property
     def errors(self) -> tuple[Errors, Errors]:
