@@ -39,7 +39,7 @@ a third, exp(−v²); rule of thumb: where it falls by less, the curve beside vi
 of any smooth law."""
 _SURE = 1.96
 """Standard deviations by which a determined shape is above zero, 95 %: a ladder of speeds in one
-direction ends with a presliding distance of 260 ± 240°, an approximation of another law."""
+direction has a presliding distance of 3.2 ± 2.3 rad beside a spring, which is neither."""
 _DOUBLED = 2.0
 """Ratio of errors by which a step is missed: it had three quarters of the mean square."""
 
