@@ -33,6 +33,7 @@ _TENTH = 0.1
 _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
+_HOME = "the home pose of the robot is not that of the profile"
 _NEGLIGIBLE = 0.01
 """Share of the excess below which a refitted value that agrees with the file's is not reported, and
 a doubtful effect is named only."""
@@ -154,12 +155,19 @@ def step_title(step: Step) -> str:
         changed = f"{_refitted_values(step, with_errors=False)} in the profile"
         of_reversal = changed.startswith(_REVERSAL)
         return f"{effect_name(step.effects[0])}: {changed}" if of_reversal else changed
+    if needs_calibration(step):
+        return f"{_HOME}, or {listed([clause(effect) for effect in kinds_of(step)], 'or')}"
     if has_other_law(step):
         return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
     kinds = kinds_of(step)
     if len(kinds) > _MOST_KINDS:
         return f"one of {len(kinds)} effects is missing, which these data cannot distinguish"
     return listed([clause(effect) for effect in kinds], "or")
+
+
+def needs_calibration(step: Step) -> bool:
+    """Whether it is a robot's geometry, or may be its home pose."""
+    return step.whole or any(doubt.code == "home" for doubt in step.doubts)
 
 
 def has_other_law(step: Step) -> bool:
@@ -234,6 +242,8 @@ def _titled_values(step: Step) -> str:
     if step.refitted:
         changed = _refitted_values(step, with_errors=True)
         return f"{effect_name(step.effects[0])}: {changed} in the profile"
+    if needs_calibration(step):
+        return step_title(step)
     values = {e: values_text(step.parameters.get(e, {})) for e in kinds_of(step)}
     if has_other_law(step) or len(values) == 1:
         return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)

@@ -69,6 +69,7 @@ from winchkit.robot.diagnosis.errors import (
     refuted_outputs,
     rms,
 )
+from winchkit.robot.diagnosis.home import with_home_doubt
 from winchkit.robot.diagnosis.pose_design import next_pose_runs
 from winchkit.robot.diagnosis.preparation import (
     Preparation,
@@ -307,10 +308,10 @@ def _with_standing(selection: RobotSelection, step: Step, index: int) -> Step:
     """A step with its share and doubts; no free curve is compared with its law."""
     engine, result = selection.engine, selection.result
     final, noise = result.final, result.noise
-    without = engine.refit(final.hypothesis.without(index), noise)
-    acts = final.hypothesis.terms[index].effect.outputs
-    standing = _standing(selection, replace(selection.final, fit=without), acts)
-    return with_standing(engine, result, step, index=index, standing=standing)
+    without = replace(selection.final, fit=engine.refit(final.hypothesis.without(index), noise))
+    standing = _standing(selection, without, final.hypothesis.terms[index].effect.outputs)
+    step = with_standing(engine, result, step, index=index, standing=standing)
+    return with_home_doubt(engine, selection.final, without, step, index)
 
 
 def _standing(selection: RobotSelection, without: FittedModel, acts: Sequence[str]) -> Standing:
