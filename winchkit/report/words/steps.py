@@ -81,12 +81,6 @@ def explained_share(step: Step) -> float:
     return step.explains if isfinite(step.explains) else step.share
 
 
-def _most_explained(step: Step) -> float:
-    """The larger of the shares beside those before it and beside all: the first of two frictions
-    imitates the second, which it does not replace."""
-    return max(explained_share(step), step.share if isfinite(step.share) else 0.0)
-
-
 def _is_negligible(step: Step) -> bool:
     """Whether a step is a refit that changes next to nothing; its transition is a nuisance."""
     if not step.refitted or not step.share < _NEGLIGIBLE:
