@@ -247,7 +247,7 @@ class _MistakeSearch:
             sigma = _SIGMA * self.motion
             weights = Weights({"closure": sigma, "position": sigma, "rotation": ANGLE})
             found = slip_in(best.table, linearise(*best.end, weights), sigma, least=1.0)
-            if found is None:
+            if found is None or found.chance > _CHANCE:
                 break
             same = slip is not None and (found.line, found.rows) == (slip.line, slip.rows)
             done = slip.length if slip and same else 0.0
