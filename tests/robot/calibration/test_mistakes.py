@@ -82,20 +82,6 @@ def test_a_cable_that_slips_is_named_with_its_row(oriented: bool, tmp_path: Path
     assert f"from row 25 of {run} on the cable of line 5 is" in fault.message
 
 
-def test_a_slip_of_a_fifth_of_the_volume_is_named(tmp_path: Path) -> None:
-    """The plain adjustment bends towards it, so that its first estimate is three times too long."""
-    scene = Scene("cabtive", True, False, 40, 2e-5, 1e-3, 11)
-    table = recorded(scene)
-    _, path = written(tmp_path, "", scene)
-    robot, motor = robot_of(read_robot(path)), table.motor.copy()
-    per_turn = (robot.lengths_at(motor + 1.0) - robot.lengths_at(motor))[:, 5]
-    motor[20:, 5] -= 0.03 / per_turn[20:]
-    run, _ = written(tmp_path, replace(table, motor=motor).csv(), scene)
-    (named,) = mistakes_in(robot, read_poses([read_run(run)], read_robot(path)))
-    assert named.code == "motor-slip:6"
-    assert "from row 21 of " in str(named)
-
-
 @pytest.mark.slow
 def test_two_mistakes_are_named_together(tmp_path: Path) -> None:
     first, second = mistake_of("swap", 3, LINES), mistake_of("shift", 4, LINES)

@@ -99,9 +99,6 @@ _CHANCE = 1e-6
 parameters as equations, and a step explains any of them (rule of thumb)."""
 _SLIPPING = 6
 """Adjustments with the length that slipped, each with what the one before left (rule of thumb)."""
-_STEPS = (1.0, 0.5, 0.25)
-"""Shares of an estimated slip that are tried: the geometry that the plain adjustment bent towards a
-slip of half the volume makes its estimate up to three times too long."""
 _SETTLING = Iteration(damping=1e-6, relative_damping=1e-6, tolerance=1e-5, steps=25)
 
 
@@ -247,21 +244,11 @@ class _MistakeSearch:
             sigma = _SIGMA * self.motion
             weights = Weights({"closure": sigma, "position": sigma, "rotation": ANGLE})
             found = slip_in(best.table, linearise(*best.end, weights), sigma, least=1.0)
-            if found is None or found.chance > _CHANCE:
+            if found is None or (slip and (found.line, found.rows) != (slip.line, slip.rows)):
                 break
-            same = slip is not None and (found.line, found.rows) == (slip.line, slip.rows)
-            done = slip.length if slip and same else 0.0
-            trials = []
-            for share in _STEPS:
-                slip = replace(found, length=done + share * found.length)
-                mistake = slip_mistake(self.robot, self.measured, slip)
-                trials.append((self._adjusted((mistake,), turned=turned), slip))
-                if trials[-1][0].error * _FACTOR < best.error:
-                    break
-            least, slip = min(trials, key=lambda trial: trial[0].error)
-            if not least.error < best.error:
-                break
-            best = least
+            slip = replace(found, length=found.length + (slip.length if slip else 0.0))
+            mistake = slip_mistake(self.robot, self.measured, slip)
+            best = self._adjusted((mistake,), turned=turned)
         return best if best.error * _FACTOR < plain.error else None
 
     def _best(self, plain: _Adjusted, usual: float) -> list[_Adjusted]:
