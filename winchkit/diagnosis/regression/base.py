@@ -47,11 +47,11 @@ class Folds:
     count: int
 
 
-_CORRECTION = (-0.25, 0.0)
+_CORRECTION = (-0.5, 0.25)
 """Range of the correction of second differences, in squared intervals; theory: -1/12 for exact
-samples, none for a rate of the drive's own. Measured: 25 right models lie between -0.14 and 0
-where their deviation is below 0.1; a free one took the place of a lag (2.3) or of inertia (-1.4)
-in the errors of the unchanged profile."""
+samples, and less for signals that were smoothed. Measured: 25 right models lie between -0.14 and 0
+where their deviation is below 0.1, the simulated benches at -0.34; a free one took the place of a
+lag (2.3) or of an inertia (-1.4) in the errors of the unchanged profile."""
 
 
 class Regression(ABC):
