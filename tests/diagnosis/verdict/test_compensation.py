@@ -134,6 +134,18 @@ def test_a_factor_is_named_beside_a_value_that_does_not_follow_it(tmp_path: Path
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("late", "lag", "name"), [(0.02, 0.0, "lead"), (0.0, 0.02, "lag")])
+def test_a_delay_and_a_low_pass_of_the_torque_have_names_of_their_own(
+    tmp_path: Path, late: float, lag: float, name: str
+) -> None:
+    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, lag=lag, late=late))
+    (step,) = [step for step in found.steps if not step.refitted]
+    assert step.effects == (f"torque-{name}",)
+    ((_, size),) = step.parameters[step.effects[0]].items()
+    assert size.value == pytest.approx(lag - late, rel=0.05)
+
+
+@pytest.mark.slow
 def test_values_that_do_change_are_not_doubted(tmp_path: Path) -> None:
     """Friction that grew by a third and viscous friction that halved: no curve, no factor."""
     found = diagnosed(tmp_path, runs(4 / 3 * COULOMB, VISCOUS / 2, 0.0))
