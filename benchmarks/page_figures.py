@@ -259,10 +259,10 @@ def drawn(page: Any, url: str) -> dict[str, float]:
     start = time.monotonic()
     page.wait_for_selector("#time .u-over", timeout=PATIENCE)
     first, found = time.monotonic() - start, []
-    page.wait_for_selector(".ladder .head", timeout=PATIENCE)
+    page.wait_for_selector(".models .head", timeout=PATIENCE)
     for place in (1, 0, 1, 0):
         page.evaluate(SEEN)
-        page.locator(".ladder .head").nth(place).click()
+        page.locator(".models .head").nth(place).click()
         until(page, "window.drawn !== null")
         found.append(page.evaluate("window.drawn") / 1e3)
     return {"drawn_s": min(found), "read_and_drawn_s": first}

@@ -12,6 +12,7 @@ from winchkit.wings import homes, lazy
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Stations as Stations
+    from winchkit.bench.cells.results import CellExchange as CellExchange
     from winchkit.bench.cells.results import CellTares as CellTares
     from winchkit.bench.cells.results import CellTiming as CellTiming
     from winchkit.bench.cells.results import CellValue as CellValue
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from winchkit.drivers.can.tools.scan import ScannedNode as ScannedNode
     from winchkit.drivers.can.tools.trace_decoder import TracedNode as TracedNode
     from winchkit.drivers.clock import Clock as Clock
+    from winchkit.drivers.counters import Latency as Latency
     from winchkit.dynamics.export import ExportedModel as ExportedModel
     from winchkit.effects.effect import Dynamics as Dynamics
     from winchkit.effects.effect import Plausible as Plausible
@@ -92,7 +94,7 @@ if TYPE_CHECKING:
 _HOME = homes(
     {
         "winchkit.bench.bench": "Stations",
-        "winchkit.bench.cells.results": "CellTares CellTiming CellValue",
+        "winchkit.bench.cells.results": "CellExchange CellTares CellTiming CellValue",
         "winchkit.bench.commissioning.record": "CommissioningRecord",
         "winchkit.bench.control.homing_motion": "HomingRequest",
         "winchkit.bench.control.snapshot": "Direction Trip WinchSnapshot",
@@ -113,6 +115,7 @@ _HOME = homes(
         "winchkit.diagnosis.plan": "Plan",
         "winchkit.diagnosis.results": "Comparison RobotDiagnosis",
         "winchkit.diagnosis.verdict.equivalence": "EquivalenceSet",
+        "winchkit.drivers.counters": "Latency",
         "winchkit.drivers.can.bus.load": "BusLoad",
         "winchkit.drivers.can.canopen.identity": "Identity",
         "winchkit.drivers.can.tools.config": "Difference",

@@ -36,6 +36,12 @@ def recorded(name: str) -> list[Run]:
     ]
 
 
+SIZES = {
+    "demo-elastic-rope": ("axial_stiffness", 300e3, "N"),
+    "demo-stretched-cell": ("gain_error", 0.02, "1"),
+    "demo-motor-drag": ("torque", 0.025, "N m"),
+}
+"""Parameters of the simulation, expected values, and their unit."""
 ELSEWHERE = "five-cornered-drum"
 """Whose diagnosis, the longest, tests/repository/test_examples.py has in ``.ci/run``."""
 
@@ -65,6 +71,13 @@ def test_what_a_bench_hides_is_found(name: str) -> None:
             assert output.noise_rms is not None
             assert output.heldout_rms_after < 1.3 * output.noise_rms
             assert output.heldout_rms_after <= 1.02 * output.heldout_rms_before
+        if name in SIZES:
+            parameter, true, unit = SIZES[name]
+            (answer,) = answers
+            estimate = found.steps[0].parameters[answer][parameter]
+            assert estimate.unit == unit
+            assert abs(estimate.value - true) < 5 * estimate.std
+            assert estimate.std < 0.1 * true
     else:
         assert found.verdict != "adequate"
         assert not certain

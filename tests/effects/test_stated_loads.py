@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis_runs import GROOVED, Ride, made
 from effect_lines import CATALOGUE, EFFECTS
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects.catalogue import load_catalogue
@@ -73,6 +74,23 @@ def test_no_lever_is_fitted_to_masses_that_do_not_differ_or_are_unknown(
 
 def test_it_needs_several_payloads() -> None:
     assert load_catalogue()["joint-payload"].needs == ("axis", "payloads")
+
+
+@pytest.mark.parametrize("masses", [(10.0,), (10.0, 25.0)], ids=["one load", "two"])
+def test_a_hook_is_a_share_of_one_load_as_well(masses: tuple[float, ...]) -> None:
+    """The runs state a load without the hook of 0.9 kg: a second load distinguishes the two."""
+    runs = []
+    for mass in masses:
+        for repeat in range(2):
+            seed = int(10 * mass) + repeat
+            heavier = made(seed, GROOVED, load_mass=mass + 0.9, ride=Ride(samples=600))
+            stated = {**heavier.metadata, "load_mass": f"{mass} kg"}
+            runs.append(replace(heavier, metadata=stated))
+    (step,) = diagnose(runs, GROOVED).diagnosis.steps
+    assert set(step.effects) == ({"load-offset"} | ({"load-gain"} if len(masses) == 1 else set()))
+    assert step.certain == (len(masses) > 1)
+    hook = step.parameters["load-offset"]["mass"]
+    assert hook.value == pytest.approx(0.9, abs=max(4 * hook.std, 2e-3))
 
 
 TRUE = standard_motion().load

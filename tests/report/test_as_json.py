@@ -18,19 +18,19 @@ UNKNOWN = pytest.param("five-cornered-drum", marks=pytest.mark.slow)
 
 
 @pytest.mark.slow
-def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
+def test_the_waterfall_begins_and_ends_with_the_errors_of_the_answer() -> None:
     answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
-    ladder = report_json(answer)["waterfall"]
+    waterfall = report_json(answer)["waterfall"]
     for name, output in answer.diagnosis.outputs.items():
-        rungs = [rung["heldout_rms"][name] for rung in ladder["rungs"]]
-        assert rungs[0] == output.heldout_rms_before
-        assert rungs[-1] == output.heldout_rms_after
-    assert len(ladder["rungs"]) == 1 + len(answer.diagnosis.steps)
-    assert len(ladder["first"]) == len(ladder["last"]) == len(answer.diagnosis.steps)
+        steps = [step["heldout_rms"][name] for step in waterfall["steps"]]
+        assert steps[0] == output.heldout_rms_before
+        assert steps[-1] == output.heldout_rms_after
+    assert len(waterfall["steps"]) == 1 + len(answer.diagnosis.steps)
+    assert len(waterfall["first"]) == len(waterfall["last"]) == len(answer.diagnosis.steps)
 
 
 @pytest.mark.parametrize("bench", ["demo-adequate", UNKNOWN])
-def test_nothing_named_has_no_ladder_and_no_after(bench: str) -> None:
+def test_nothing_named_has_no_waterfall_and_no_after(bench: str) -> None:
     found = report_json(answer_of(bench))
     assert found["waterfall"] is None
     assert found["residuals"]["after"] is None

@@ -131,7 +131,7 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
             "import.js",
             "figures.js",
             "sides.js",
-            "ladder.js",
+            "model_errors.js",
             "channels.js",
         )
     )
@@ -205,7 +205,7 @@ def test_look_learn_add_and_the_error_falls(
     assert view["faults"] == []
     first = view["diagnosis"]
     assert first["verdict"] == "explained"
-    effect = next(row for row in first["ladder"]["rows"] if row["kind"] == "candidate")["effect"]
+    effect = next(row for row in first["models"]["rows"] if row["kind"] == "candidate")["effect"]
     assert effect in {"drum-radius", "gear-ratio"}, "these runs do not distinguish the two"
 
     card = get(client, f"/api/card?effect={effect}")
@@ -220,14 +220,14 @@ def test_look_learn_add_and_the_error_falls(
     view = settled(client)
     workspace.changed = wake
     refit = next(found for found in shown if found["verdict"] == "refitted")
-    kinds = [row["kind"] for row in refit["ladder"]["rows"]]
+    kinds = [row["kind"] for row in refit["models"]["rows"]]
     assert kinds == ["history", "today", "floor"], "shown before it is diagnosed"
     assert _today(refit) == pytest.approx(_today(view["diagnosis"]), rel=0.05)
     _is_that_of_the_command_line(workspace, effect, tmp_path / "better.toml")
     after = _today(view["diagnosis"])
     assert min(after[o] / before[o] for o in before) < 0.6
     assert view["diagnosis"]["verdict"] == "adequate"
-    assert [row["kind"] for row in view["diagnosis"]["ladder"]["rows"]].count("history") == 1
+    assert [row["kind"] for row in view["diagnosis"]["models"]["rows"]].count("history") == 1
     assert view["profile"]["added"] == [effect]
     saved = client.get("/api/profile", headers=HEADERS)
     assert effect in saved.text
@@ -248,8 +248,8 @@ def _both_sides_have_one_axis(client: TestClient, before: dict[str, float], afte
     do(client, "compare", profile=0, runs=names)
     view = settled(client)
     assert _today(view["beside"]["diagnosis"]) == pytest.approx(before)
-    ladders = [side["diagnosis"]["ladder"] for side in (view, view["beside"])]
-    assert ladders[0]["columns"] == ladders[1]["columns"]
+    models = [side["diagnosis"]["models"] for side in (view, view["beside"])]
+    assert models[0]["columns"] == models[1]["columns"]
     for output in before:
         (own, other) = (get(client, f"/api/curve?output={output}{s}") for s in ("", "&beside=1"))
         assert (own["unit"], own["residual_unit"]) == (other["unit"], other["residual_unit"])
@@ -283,7 +283,7 @@ def _is_that_of_the_command_line(workspace: DiagnoseView, effect: str, path: Pat
 
 
 def _today(diagnosis: Any) -> dict[str, float]:
-    row = next(row for row in diagnosis["ladder"]["rows"] if row["kind"] == "today")
+    row = next(row for row in diagnosis["models"]["rows"] if row["kind"] == "today")
     return {output: cell["ratio"] for output, cell in row["cells"].items()}
 
 
@@ -373,7 +373,7 @@ def test_a_cancelled_addition_leaves_the_profile_as_it_was(tmp_path: Path) -> No
     workspace = DiagnoseView(tmp_path)
     workspace.example("demo-fat-drum").result(PATIENCE)
     before = workspace.view()
-    effect = next(r["effect"] for r in before["diagnosis"]["ladder"]["rows"] if "effect" in r)
+    effect = next(r["effect"] for r in before["diagnosis"]["models"]["rows"] if "effect" in r)
     workspace.changed = workspace.cancel
     workspace.add(effect).result(PATIENCE)
     after = workspace.view()

@@ -117,16 +117,16 @@ def test_the_address_has_zoom_comparison_filter_and_channel(browser: Any, served
     until(page, lambda: page.input_value("[aria-label='Filter runs']") == "fast")
     page.goto("about:blank")
     page.goto(f"{served.url}#diagnose/cable_length///0")
-    until(page, lambda: page.locator("#ladder-b").count() == 1)
+    until(page, lambda: page.locator("#models-b").count() == 1)
     assert page.url.endswith("/0")
     page.click("text=End comparison")
-    until(page, lambda: page.locator("#ladder").count() == 1)
+    until(page, lambda: page.locator("#models").count() == 1)
     until(page, lambda: not page.url.endswith("/0"))
     assert complaints == []
     page.context.close()
 
 
-def test_verdict_ladder_and_residual_are_seen_at_a_height_of_900(
+def test_verdict_errors_and_residual_are_seen_at_a_height_of_900(
     browser: Any, served: Served
 ) -> None:
     page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
@@ -135,7 +135,7 @@ def test_verdict_ladder_and_residual_are_seen_at_a_height_of_900(
     page.evaluate(f"{steps}.style.whiteSpace = 'pre'")
     box = page.locator("#time .plot").nth(1).bounding_box()
     assert box["y"] + box["height"] <= 900
-    heights = {row.bounding_box()["height"] for row in page.locator(".ladder .name").all()}
+    heights = {row.bounding_box()["height"] for row in page.locator(".models .name").all()}
     assert heights == {27}
     assert complaints == []
     page.context.close()
@@ -196,16 +196,16 @@ def drawing(page: Any, name: str) -> tuple[str, list[str]]:
     return drawn, [str(node.text) for node in ElementTree.fromstring(drawn).findall(".//{*}text")]
 
 
-LABELS = """() => [...document.querySelectorAll("#ladder .name > span:first-child")]
+LABELS = """() => [...document.querySelectorAll("#models .name > span:first-child")]
     .map((one) => one.firstChild.textContent)"""
 
 
 def test_exports_show_what_is_seen(browser: Any, served: Served) -> None:
     page, complaints = diagnosed(browser, f"{served.url}#diagnose/cable_length")
-    _, ladder = drawing(page, "ladder")
+    _, drawn = drawing(page, "models")
     labels = page.evaluate(LABELS)
     assert len(labels) > 2
-    assert {*labels, *filter(None, texts(page, "#ladder .value"))} <= set(ladder)
+    assert {*labels, *filter(None, texts(page, "#models .value"))} <= set(drawn)
     over = page.locator("#over .u-over").first
     over.scroll_into_view_if_needed()
     box = over.bounding_box()

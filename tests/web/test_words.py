@@ -21,6 +21,10 @@ def test_a_refusal_to_write_over_a_file_offers_no_option(tmp_path: Path) -> None
     assert page_text("name it by --sample-rate") == "name it by sample rate"
     unit = "'F' has no unit; one of N, kN; --column \"tension=\" where it is none of them"
     assert page_text(unit) == "'F' has no unit; one of N, kN"
+    unused = (
+        '--rated-torque is not used: no column is in A; --column "tension=COLUMN [A]" where one is'
+    )
+    assert page_text(unused) == "rated torque is not used: no column is in A"
     alone = "a run of a load cell alone, for `winchkit cell diagnose --run`; import the other file"
     assert page_text(alone) == "a run of a load cell alone; import the other file"
 

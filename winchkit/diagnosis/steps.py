@@ -1,7 +1,8 @@
 """Steps of a diagnosis: every effect of the final model with its values, its share and its doubts.
 
-A doubt is written on its step and never removes another. A step is certain where its law is
-established and less is left in its outputs than a tenth of what it explains.
+A doubt is written on its step and never removes another. A step is certain where it has none: one
+law without alternatives or a curve, plausible and determined values, and less left in its outputs
+than a tenth of what it explains.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ _REJECTED = 0.01
 _LARGEST_COLLINEARITY = 1e5
 """Law and channel are accurate to 0.3 % at best: where the others imitate an effect's change to
 within that, what distinguishes it is less than their error."""
+_NOT_CONVERGED = "not-converged"
+"""The only doubt with which a step is certain: its values may change, its law does not."""
 
 
 def steps_of(
@@ -171,35 +174,15 @@ def with_standing(
     if small:
         what = "another step explains ten times as much there, and this one may only correct it"
         doubts.append(Doubt("small", what))
-    single = len(step.effects) == 1
-    established = single and curve is None
+    established = len(step.effects) == 1 and curve is None
     return replace(
         step,
         law="established" if established else "open",
-        certain=established
-        and not standing.remaining
-        and not any(d.code in _SERIOUS for d in doubts),
+        certain=all(doubt.code == _NOT_CONVERGED for doubt in doubts),
         share=standing.share,
         doubts=tuple(doubts),
         curve=curve.curve.words if curve is not None else "",
     )
-
-
-_SERIOUS = frozenset(
-    {
-        "implausible",
-        "collinear",
-        "undetermined",
-        "small",
-        "oversized",
-        "short-record",
-        "reversal",
-        "asymmetry",
-        "unresolved",
-        "turns",
-    }
-)
-"""Doubts with which no step is certain."""
 
 
 def _doubts(
@@ -228,7 +211,7 @@ def _doubts(
     if not result.final.converged:
         steps = result.final.iterations
         what = f"the fit did not converge in {steps} steps: its values may change"
-        out.append(Doubt("not-converged", what))
+        out.append(Doubt(_NOT_CONVERGED, what))
     for code, check in (
         ("oversized", oversized),
         ("short-record", short_record),

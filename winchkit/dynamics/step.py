@@ -200,7 +200,7 @@ def _values(profile: WinchProfile, term: Term, constants: dict[str, Constant]) -
 
 def _is_untraced(profile: WinchProfile, term: Term) -> bool:
     """Whether an effect has no formula of one sample and its memory: a run's load is no sample."""
-    if "payloads" in term.effect.needs:
+    if {"load_mass", "payloads"} & set(term.effect.needs):
         return True
     if term.effect.carry is None:
         return needs_a_step(profile, term)

@@ -20,7 +20,7 @@ Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
     "axis", "ungeared", "half_turn", "torque", "prediction", "cell",
-    "payloads", "inertia",
+    "load_mass", "payloads", "inertia",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -37,6 +37,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "half_turn": "a run in which the drum turns by half a turn at least",
     "torque": "a motor_torque channel",
     "prediction": "the torque that another model predicts (--predicted)",
+    "load_mass": "load_mass in every run",
     "payloads": "load_mass in every run, of two sizes at least",
     "cell": "a load channel or load_mass, or a motor_torque that the tension predicts",
     "inertia": "the inertia in the profile ([motor] inertia)",

@@ -14,7 +14,7 @@ from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import LedgerEntry, WinchProfile
 from winchkit.units import dimension_of, parse
 
-LADDER_UNITS: Mapping[str, str] = {**RESULT_UNITS, "platform_position": "m"}
+ERROR_UNITS: Mapping[str, str] = {**RESULT_UNITS, "platform_position": "m"}
 """Outputs of winches and robots, in the order of reports, with their SI units."""
 
 
@@ -59,10 +59,10 @@ def _step(entry: LedgerEntry) -> HistoryStep:
 
 def _si(entry: LedgerEntry, name: str) -> dict[str, float]:
     written: Mapping[str, str] = getattr(entry, name)
-    unknown = [output for output in written if output not in LADDER_UNITS]
+    unknown = [output for output in written if output not in ERROR_UNITS]
     if unknown:
         raise FileError(
             f"ledger, step {entry.did} {entry.effect}: {name} has '{unknown[0]}'; "
-            f"outputs are {', '.join(LADDER_UNITS)}"
+            f"outputs are {', '.join(ERROR_UNITS)}"
         )
-    return {o: parse(text, dimension_of(LADDER_UNITS[o]) or "ratio") for o, text in written.items()}
+    return {o: parse(text, dimension_of(ERROR_UNITS[o]) or "ratio") for o, text in written.items()}

@@ -57,7 +57,10 @@ def read_pulley(text: str) -> dict[str, str]:
     """A pulley of ``"40 mm, 90 deg"``; raises UsageError."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) > 2:
-        raise UsageError(f"'{text}' has {len(parts)} values; write such as '{PULLEY_EXAMPLE}'")
+        raise UsageError(
+            f"'{text}' has {len(parts)} values, not a radius and a wrap; with decimal points, "
+            f"write such as '{PULLEY_EXAMPLE}'"
+        )
     table = dict(zip(("radius", "wrap"), parts, strict=False))
     for name, value in table.items():
         marker = marker_at(WinchProfile, ("pulley", 0, name))

@@ -18,7 +18,7 @@ from winchkit.report.words.sentence import changes_text, sentence
 
 def report_json(answer: Answer) -> dict[str, Any]:
     """A diagnosis as ``winchkit diagnose --json`` prints it, in SI."""
-    diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
+    diagnosis, parts = answer.diagnosis, waterfall_of(answer)
     if (by_wing := wings.call("json", answer)) is not None:
         drawn = by_wing(answer)
     else:
@@ -30,7 +30,7 @@ def report_json(answer: Answer) -> dict[str, Any]:
         "would_change": changes_text(diagnosis),
         "not_looked_for": [{"effect": e, "needs": list(needs)} for e, needs in untestable(answer)],
         "evidence_of_noise": max(answer.result.threshold, 0.0),
-        "waterfall": None if ladder is None else _waterfall(ladder),
+        "waterfall": None if parts is None else _waterfall(parts),
         **drawn,
     }
 
@@ -57,9 +57,9 @@ def _maps(regression: TimeSeriesRegression, residual: Array) -> list[Any]:
     return [drawn.to_json() for drawn in residual_maps(regression, residual)]
 
 
-def _waterfall(ladder: Waterfall) -> dict[str, Any]:
+def _waterfall(parts: Waterfall) -> dict[str, Any]:
     return {
-        "rungs": [{"model": name, "heldout_rms": dict(rms)} for name, rms in ladder.rungs],
-        "first": {name: dict(rms) for name, rms in ladder.first.items()},
-        "last": {name: dict(rms) for name, rms in ladder.last.items()},
+        "steps": [{"model": name, "heldout_rms": dict(rms)} for name, rms in parts.steps],
+        "first": {name: dict(rms) for name, rms in parts.first.items()},
+        "last": {name: dict(rms) for name, rms in parts.last.items()},
     }

@@ -93,12 +93,12 @@ def _sure(name: str, estimate: Estimate) -> str:
     return estimate_text(name, estimate) + (f" ({interval})" if interval else "")
 
 
-def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
-    """Bars of held-out error per rung beside the noise floor."""
-    if ladder is None:
+def waterfall(parts: Waterfall | None, diagnosis: Diagnosis) -> Markup:
+    """Bars of held-out error per step beside the noise floor."""
+    if parts is None:
         return Markup("")
     outputs = diagnosis.outputs
-    longest = {name: 1.05 * _longest(ladder, name, output) for name, output in outputs.items()}
+    longest = {name: 1.05 * _longest(parts, name, output) for name, output in outputs.items()}
 
     def row(label: str, errors: Mapping[str, float]) -> list[str]:
         return [
@@ -108,18 +108,18 @@ def waterfall(ladder: Waterfall | None, diagnosis: Diagnosis) -> Markup:
 
     head = ["model", *(output_name(name) for name in outputs)]
     caption = "Held-out error, rms, after each added effect. The vertical mark is the noise."
-    out = [table(caption, head, [row(label, errors) for label, errors in ladder.rungs])]
-    if len(ladder.first) > 1:
-        alone = [row(f"only {name}", errors) for name, errors in ladder.first.items()]
-        without = [row(f"all but {name}", errors) for name, errors in ladder.last.items()]
+    out = [table(caption, head, [row(label, errors) for label, errors in parts.steps])]
+    if len(parts.first) > 1:
+        alone = [row(f"only {name}", errors) for name, errors in parts.first.items()]
+        without = [row(f"all but {name}", errors) for name, errors in parts.last.items()]
         caption = "Each effect added alone; and each removed, with all others kept."
         out.append(table(caption, head, [*alone, *without]))
     return join(out)
 
 
-def _longest(ladder: Waterfall, name: str, output: OutputFit) -> float:
-    rungs = (errors for _, errors in ladder.rungs)
-    errors = [e[name] for e in chain(rungs, ladder.first.values(), ladder.last.values())]
+def _longest(parts: Waterfall, name: str, output: OutputFit) -> float:
+    steps = (errors for _, errors in parts.steps)
+    errors = [e[name] for e in chain(steps, parts.first.values(), parts.last.values())]
     return max([output.noise_rms or 0.0, *(e for e in errors if isfinite(e))])
 
 

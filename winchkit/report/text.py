@@ -18,7 +18,7 @@ from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffs
 from winchkit.effects.card import sparkline
 from winchkit.effects.effect import parameter_name
 from winchkit.effects.placement import HOME
-from winchkit.profile_edit.history import LADDER_UNITS
+from winchkit.profile_edit.history import ERROR_UNITS
 from winchkit.quantity_text import grouped, percent, scale_for, significant, with_std
 from winchkit.report.comparison_rows import (
     HEAD,
@@ -106,7 +106,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     ]
     if verbose:
         blocks += [
-            _ladder(answer),
+            _contributions(answer),
             _confusion(diagnosis),
             _correlations(diagnosis),
             _next(diagnosis),
@@ -291,17 +291,17 @@ def _offsets(offsets: Sequence[RunOffset]) -> list[str]:
     return ["", "offset of each run", *aligned(rows, words=2), *last]
 
 
-def _ladder(answer: Answer) -> list[str]:
+def _contributions(answer: Answer) -> list[str]:
     """Contribution of each of several effects: added alone first, and removed last."""
-    ladder = waterfall_of(answer)
-    if ladder is None or len(ladder.first) < 2:
+    parts = waterfall_of(answer)
+    if parts is None or len(parts.first) < 2:
         return []
     outputs = answer.diagnosis.outputs
     scales = {n: error_scale(o) for n, o in outputs.items()}
     states = [
-        *ladder.rungs,
-        *((f"only {name}", rms) for name, rms in ladder.first.items()),
-        *((f"all but {name}", rms) for name, rms in ladder.last.items()),
+        *parts.steps,
+        *((f"only {name}", rms) for name, rms in parts.first.items()),
+        *((f"all but {name}", rms) for name, rms in parts.last.items()),
     ]
     rows = [["held-out error, rms", *(output_name(name) for name in scales)]]
     rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
@@ -398,7 +398,7 @@ def _shape(answer: Answer, where: Attribution) -> str:
     """The mean residual over its variable, as bars from its lowest to its highest value."""
     _, mean = unexplained_curve(answer, where)
     low, high = float(mean.min()), float(mean.max())
-    scale = scale_for((low, high), LADDER_UNITS[where.output])
+    scale = scale_for((low, high), ERROR_UNITS[where.output])
     bars = sparkline(mean, min(_BARS, len(mean)))
     return f"{bars}  {scale.text(low, 2)} to {scale.text(high, 2)}"
 

@@ -11,6 +11,7 @@ from winchkit.wings import homes, lazy
 
 if TYPE_CHECKING:
     from winchkit.robot.bench.computation import Computation as Computation
+    from winchkit.robot.bench.platform_correction import HeldValues as HeldValues
     from winchkit.robot.bench.trajectory import PlatformTrajectory as PlatformTrajectory
     from winchkit.robot.calibration.calibrate import Calibrated as Calibrated
     from winchkit.robot.calibration.options import Options as Options
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _HOME = homes(
     {
         "winchkit.robot.bench.computation": "Computation",
+        "winchkit.robot.bench.platform_correction": "HeldValues",
         "winchkit.robot.bench.trajectory": "PlatformTrajectory",
         "winchkit.robot.calibration.calibrate": "Calibrated",
         "winchkit.robot.calibration.options": "Options",

@@ -26,7 +26,7 @@ from winchkit.quantity_text import percent, quantity
 from winchkit.report.figures.reduction import strongest
 from winchkit.report.words.vocabulary import effect_name, output_name
 from winchkit.web.curves import curves_of
-from winchkit.web.ladder import ModelErrors, card, patterns_of
+from winchkit.web.model_errors import ModelErrors, card, patterns_of
 from winchkit.web.state import PageState, Version
 
 
@@ -162,7 +162,7 @@ def refit(
     return replace(
         state,
         versions=(*state.versions, Version(path, effect)),
-        rungs=(*state.rungs, ModelErrors(label, before)),
+        earlier=(*state.earlier, ModelErrors(label, before)),
         said=_said(outputs),
         answer=WinchAnswer(answer.engine, answer.result, shown),
         refitted=True,

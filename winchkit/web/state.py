@@ -18,7 +18,7 @@ from winchkit.profile_edit.naming import extended_name
 from winchkit.report.words.vocabulary import VERDICT_NAMES, effect_name, listed
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
-from winchkit.web.ladder import ModelErrors, ladder, refitted, verdict
+from winchkit.web.model_errors import ModelErrors, model_errors, refitted, verdict
 
 _MOST_EFFECTS = 3
 """Effects of a set that a cause names; of a larger one its place."""
@@ -113,7 +113,7 @@ class PageState:
     the memory that an answer holds."""
     refitted: bool = False
     """Whether an addition is fitted and shown, and its diagnosis under way."""
-    rungs: tuple[ModelErrors, ...] = ()
+    earlier: tuple[ModelErrors, ...] = ()
     """Errors of the profiles before the present one."""
     said: str = ""
     """What the last addition changed, for the live region."""
@@ -230,6 +230,6 @@ class PageState:
             beside = None if known is None else known.diagnosis
             words = refitted(self.said) if self.refitted else verdict(self.answer.diagnosis)
             words = in_units_of(self.answer.engine.regression.dataset.profile, words)
-            out["diagnosis"] = words | {"ladder": ladder(self.answer, self.rungs, beside)}
+            out["diagnosis"] = words | {"models": model_errors(self.answer, self.earlier, beside)}
             out["commands"] = self.commands()
         return out

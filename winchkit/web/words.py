@@ -8,7 +8,7 @@ from pathlib import Path
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*)")
 _ELSEWHERE = re.compile(
     r", or (?:replace|write over) it \(--replace[^)]*\)"
-    r"|(?:;|, or name it by) --column \"[^\"]*\"(?: where it is none of them)?"
+    r"|(?:;|, or name it by) --column \"[^\"]*\"(?: where (?:it is none of them|one is))?"
     r"|, for `winchkit [^`]*`"
 )
 """Ways that the page does not offer."""

@@ -257,7 +257,7 @@ class DiagnoseWork:
         copy = self.keep(path.name, path.read_bytes())
         named = self.named(profile)
         made = (origin,) if origin else ()
-        self._set(source=named, made=made, versions=(Version(copy),), rungs=())
+        self._set(source=named, made=made, versions=(Version(copy),), earlier=())
         self._set(answer=None, curves={})
 
     def _simulate(self, simulated: ExampleRuns, folder: Path, place: str, origin: str) -> None:
@@ -374,9 +374,9 @@ class DiagnoseWork:
             raise UsageError("there is nothing to undo")
         earlier = state.versions[-2].path
         answer, curves = state.before or self._diagnosed(read_profile(earlier))
-        versions, rungs = state.versions[:-1], state.rungs[:-1]
+        versions, before = state.versions[:-1], state.earlier[:-1]
         self._set(
-            versions=versions, rungs=rungs, said="", answer=answer, curves=curves, before=None
+            versions=versions, earlier=before, said="", answer=answer, curves=curves, before=None
         )
 
     def _compare(self, profile: int | str, names: Sequence[str]) -> None:
@@ -390,7 +390,7 @@ class DiagnoseWork:
             side = replace(side, source=profile, versions=(version,))
         elif 0 <= profile < len(state.versions):
             side = replace(
-                side, versions=state.versions[: profile + 1], rungs=state.rungs[:profile]
+                side, versions=state.versions[: profile + 1], earlier=state.earlier[:profile]
             )
         else:
             raise UsageError(f"there is no version {profile} of the profile")

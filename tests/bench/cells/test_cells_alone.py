@@ -107,6 +107,9 @@ def test_information_and_rate(cell: Served, tmp_path: Path) -> None:
     report = winchkit.cell_rate(bench, "A", duration=0.5)
     assert report.limits["`rate` in the wiring"] == 40.0
     assert report.rate < 50.0
+    assert report.exchange is not None
+    assert report.exchange.queries == 1
+    assert 0.0 < report.latency.p50 <= report.latency.worst
     with pytest.raises(UsageError, match=r"the bench has A\.cell"):
         winchkit.cell_info(bench, "B")
 

@@ -48,7 +48,7 @@ def test_a_bench_moves_resets_and_closes_with_it(tmp_path: Path, mechanism: str)
 
 
 @pytest.mark.parametrize("mechanism", ["heartbeat", "guarding", "rpdo-timeout"])
-def test_the_last_rung_is_silence_in_what_this_drive_watches(
+def test_the_last_method_is_silence_in_what_this_drive_watches(
     tmp_path: Path, mechanism: str
 ) -> None:
     path = write_bench(tmp_path, host_loss=mechanism)

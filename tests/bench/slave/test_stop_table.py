@@ -104,12 +104,12 @@ def stopped(folder: Path, case: Case) -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.method.name)
-def test_a_rung_stops_the_drive_that_receives_none_before(tmp_path: Path, case: Case) -> None:
+def test_a_method_stops_the_drive_that_receives_none_before(tmp_path: Path, case: Case) -> None:
     stopped(tmp_path, case)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.method.name)
-def test_a_rung_that_is_switched_off_makes_a_test_fail(
+def test_a_method_that_is_switched_off_makes_a_test_fail(
     tmp_path: Path, case: Case, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     table = tuple(row for row in STOP_TABLE if row.method is not case.method)
@@ -118,7 +118,7 @@ def test_a_rung_that_is_switched_off_makes_a_test_fail(
         stopped(tmp_path, case)
 
 
-def test_every_rung_has_a_case() -> None:
+def test_every_method_has_a_case() -> None:
     assert {case.method for case in CASES} == {row.method for row in STOP_TABLE} == set(StopMethod)
 
 

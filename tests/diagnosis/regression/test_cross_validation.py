@@ -103,6 +103,16 @@ def test_the_held_out_error_is_that_of_the_same_fits_in_the_outputs_units() -> N
         assert rms == pytest.approx(NOISE[output] * np.sqrt(kept), rel=0.15)
 
 
+def test_an_unknown_at_its_bound_stays_there_whatever_is_held_out() -> None:
+    """A friction that would have to drive: the model is the one without it, in every fold."""
+    regression = problem_of((term("motor-coulomb", torque=-0.03),))
+    noise, folds = even(regression), regression.groups
+    found = fitted(regression, DRAG)
+    assert found.hypothesis.terms[0].values["torque"] == 0.0
+    none = held_out(regression, fitted(regression), noise, folds)
+    assert held_out(regression, found, noise, folds) == pytest.approx(none)
+
+
 def test_held_out_errors_are_larger_than_fitted_ones() -> None:
     regression = problem_of(())
     found, noise = fitted(regression, GAIN, DRAG), even(regression)

@@ -134,7 +134,9 @@ def test_profile_ends_agree_with_full_refits() -> None:
                 regression.residual(regression.hypothesis(vector, found.hypothesis)) * inverse_sigma
             )
 
-        best = least_squares(residual, found.vector[others], x_scale="jac")
+        low, high = (bound[others] for bound in regression.bounds(found.hypothesis))
+        start = np.clip(found.vector[others], low + 1e-6, high - 1e-6)
+        best = least_squares(residual, start, x_scale="jac", bounds=(low, high))
         return 2 * float(best.cost) - found.chi_square
 
     first = regression.nuisance_columns.shape[1]

@@ -48,8 +48,9 @@ def lifted(seed: int, wave: float) -> Run:
     height = 1.0 - 0.98 * np.cos(2 * np.pi * time / 15)
     angle = height / RADIUS
     rate = np.gradient(angle, time)
+    acceleration = 0.98 * (2 * np.pi / 15) ** 2 * np.cos(2 * np.pi * time / 15)
     torque = (
-        MASS * 9.80665 * RADIUS
+        MASS * (9.80665 + acceleration) * RADIUS
         + FRICTION * np.tanh(rate / 0.05)
         + COGGING * np.sin(3 * angle + 0.4)
         + random.normal(0, NOISE, time.size)

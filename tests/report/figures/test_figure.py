@@ -15,6 +15,7 @@ from figure_drawn import across, down, drawn, polylines
 from report_answers import AT_NOISE, ELASTIC, FRICTIONAL, NOISY, diagnosis_of
 from report_parsed import HOSTILE, Page
 from winchkit.fleet.report.comparison import shared_effects_html
+from winchkit.report.figures.error_ratios import error_ratios, fleet_error_ratios
 from winchkit.report.figures.export import png, write_figures
 from winchkit.report.figures.figure import (
     Figure,
@@ -24,7 +25,6 @@ from winchkit.report.figures.figure import (
     Panel,
     RunMark,
 )
-from winchkit.report.figures.ladder import error_ladder, fleet_ladders
 from winchkit.report.figures.layout import NARROW, WIDE, density_levels, scene_of, signed_levels
 from winchkit.report.figures.reduction import bin_means, decimated, filled_edges
 from winchkit.report.figures.tokens import DARK, LIGHT, STYLES, style_sheet
@@ -225,9 +225,9 @@ def test_colours_are_distinct_in_luminance_and_all_declared() -> None:
 OUTPUTS = {"tension": AT_NOISE, "cable_length": NOISY, "motor_torque": FRICTIONAL}
 
 
-def test_the_ladder_has_the_ratios_and_the_worst_first() -> None:
-    ladder = error_ladder(OUTPUTS, extended=True, changed="with x")
-    rows = list(csv.DictReader(io.StringIO(ladder.table().csv())))
+def test_the_figure_has_the_ratios_and_the_worst_first() -> None:
+    drawn = error_ratios(OUTPUTS, extended=True, changed="with x")
+    rows = list(csv.DictReader(io.StringIO(drawn.table().csv())))
     assert [row["output"] for row in rows] == ["motor torque", "cable length", "tension"]
     for row, output in zip(rows, (FRICTIONAL, NOISY, AT_NOISE), strict=True):
         noise = output.noise_rms
@@ -239,9 +239,9 @@ def test_the_ladder_has_the_ratios_and_the_worst_first() -> None:
             assert float(row[column]) == pytest.approx(error / noise, rel=1e-6)
 
 
-def test_without_noise_there_is_no_ladder_and_errors_are_compared_with_signals() -> None:
+def test_without_noise_there_is_no_figure_and_errors_are_compared_with_signals() -> None:
     outputs = {name: replace(one, noise_rms=None) for name, one in OUTPUTS.items()}
-    assert error_ladder(outputs) is None
+    assert error_ratios(outputs) is None
     assert worst_outputs(outputs)[0] == "motor_torque"
 
 
@@ -256,7 +256,7 @@ def test_the_page_over_all_winches_draws_each_and_keeps_names_as_text() -> None:
     (first, second) = page.figures["errors-cable_length"]["columns"][2]
     assert first == pytest.approx(0.36 / 0.30)
     assert second is None, "no effect was named there"
-    assert next(f.id for f in fleet_ladders(found)) == "errors-cable_length"
+    assert next(f.id for f in fleet_error_ratios(found)) == "errors-cable_length"
 
 
 def test_headlines_are_short() -> None:

@@ -191,7 +191,7 @@ def test_five_corners_are_drawn_within_a_turn() -> None:
     assert int(np.argmax(power)) + 1 == 5
 
 
-def test_no_step_draws_nothing_after_and_no_ladder() -> None:
+def test_no_step_draws_nothing_after_and_no_waterfall() -> None:
     answer = answer_of("five-cornered-drum")
     assert waterfall_of(answer) is None
     page = page_of("five-cornered-drum")
@@ -201,17 +201,17 @@ def test_no_step_draws_nothing_after_and_no_ladder() -> None:
     assert "Unexplained residual" in page.text
 
 
-def test_the_ladder_begins_and_ends_at_the_figures() -> None:
+def test_the_waterfall_begins_and_ends_at_the_figures() -> None:
     answer = answer_of("demo-elastic-rope")
-    ladder = waterfall_of(answer)
-    assert ladder is not None
+    waterfall = waterfall_of(answer)
+    assert waterfall is not None
     fit = answer.diagnosis.outputs["cable_length"]
-    errors = [rung["cable_length"] for _, rung in ladder.rungs]
+    errors = [step["cable_length"] for _, step in waterfall.steps]
     assert (errors[0], errors[-1]) == (fit.heldout_rms_before, fit.heldout_rms_after)
-    ((name, alone),) = ladder.first.items()
+    ((name, alone),) = waterfall.first.items()
     assert name == "cable-elongation-linear"
     assert alone["cable_length"] == fit.heldout_rms_after
-    assert ladder.last[name]["cable_length"] == fit.heldout_rms_before
+    assert waterfall.last[name]["cable_length"] == fit.heldout_rms_before
 
 
 def test_a_confusion_set_is_reported_with_angles() -> None:

@@ -21,7 +21,7 @@ from winchkit.profile_edit.history import HistoryStep
 from winchkit.quantity_text import between, plain
 from winchkit.report.html.markup import formula
 from winchkit.report.pages.effects import effects_html
-from winchkit.report.pages.history import ladder_html
+from winchkit.report.pages.history import history_html
 from winchkit.report.words.vocabulary import interval_text
 
 RUNS = ("a.csv", "b.csv")
@@ -35,7 +35,7 @@ GROWN = (
 
 
 def test_every_step_has_a_bar_as_long_as_its_error() -> None:
-    page = Page(ladder_html("p", GROWN))
+    page = Page(history_html("p", GROWN))
     widths = [
         float(match[1])
         for _, a in page.elements
@@ -49,14 +49,14 @@ def test_every_step_has_a_bar_as_long_as_its_error() -> None:
 
 
 def test_an_empty_ledger_says_so_and_names_stay_text() -> None:
-    page = Page(ladder_html(HOSTILE, ()))
+    page = Page(history_html(HOSTILE, ()))
     assert "No effect was added" in page.text
     assert page.count("script") == 0
 
 
 def test_a_step_that_was_not_judged_has_a_dash() -> None:
     bare = HistoryStep("remove", "mine", date(2026, 11, 3))
-    page = Page(ladder_html("p", (*GROWN, bare)))
+    page = Page(history_html("p", (*GROWN, bare)))
     assert page.text.rstrip().endswith("–")
     assert "− mine" in page.text
 

@@ -10,7 +10,7 @@ import pytest
 from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED, diagnosis_of
 from winchkit.diagnosis.results import Doubt, Estimate, Place, Step
 from winchkit.report.text import step_lines
-from winchkit.report.words.sentence import headline, sentence
+from winchkit.report.words.sentence import changes_text, headline, sentence
 from winchkit.report.words.steps import (
     alike,
     cause,
@@ -32,6 +32,22 @@ def test_a_step_has_value_error_without_and_with_it_and_share() -> None:
     assert text == (
         "the cable is elastic: EA = 249.9 ± 7.0 kN; cable length 1.50 → 0.360 mm; explains 99 %"
     )
+
+
+def test_beside_an_output_far_off_the_share_of_the_one_that_falls_is_given() -> None:
+    outputs = OUTPUTS | {"tension": replace(AT_NOISE, heldout_rms_before=5e3)}
+    before = {"cable_length": NOISY.heldout_rms_before, "tension": 5e3}
+    after = before | {"cable_length": NOISY.noise_rms or 0.0}
+    text = step_text(replace(ELASTIC, share=1e-5), outputs, (before, after))
+    assert text.endswith("explains 100 % of its excess, under 0.1 % of all")
+
+
+def test_a_home_pose_that_explains_as_much_comes_before_a_law_of_the_cable() -> None:
+    step = replace(ELASTIC, law="open", doubts=(Doubt("home", "alone"),))
+    assert step_text(step) == (
+        "the home pose of the robot is not that of the profile, or the cable is elastic"
+    )
+    assert changes_text(diagnosis_of("explained", step)).startswith("Calibrate the robot first")
 
 
 def test_of_laws_that_overlap_the_first_explains_most_and_comes_first() -> None:
@@ -84,8 +100,9 @@ def test_laws_of_one_kind_are_named_once() -> None:
     stretch = replace(ELASTIC, effects=laws, law="open", doubts=(doubt,))
     assert step_text(stretch) == "the cable is elastic: EA = 249.9 ± 7.0 kN"
     assert doubt_texts(stretch) == [
-        "these runs cannot distinguish it from cable-elongation-exponential and "
-        "cable-elongation-quartic"
+        "these runs cannot distinguish it from exponential elongation of the cable "
+        "(cable-elongation-exponential) and quartic elongation of the cable "
+        "(cable-elongation-quartic)"
     ]
 
 
@@ -103,7 +120,8 @@ def test_signatures_far_apart_are_not_called_indistinguishable() -> None:
     assert alike(apart) == {}
     assert alike(FRICTION) == {"pulley-capstan": 0.002}
     assert doubt_texts(apart) == [
-        "these runs are explained as well by pulley-capstan, in another way"
+        "these runs are explained as well by capstan friction at a pulley (pulley-capstan), in "
+        "another way"
     ]
 
 

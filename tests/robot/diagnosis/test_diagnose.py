@@ -170,8 +170,8 @@ def test_an_effect_is_added_on_its_line_and_taken_back(tmp_path: Path) -> None:
     after = answer("compare", run, "--profile", better)["outputs"]["platform_position"]
     assert after["rms"] < 0.6 * before["rms"]
     assert invoke("check", better).exit_code == 0
-    ladder = answer("ledger", "-p", better)["steps"]
-    assert ladder[0]["after"]["platform_position"] < ladder[0]["before"]["platform_position"]
+    steps = answer("ledger", "-p", better)["steps"]
+    assert steps[0]["after"]["platform_position"] < steps[0]["before"]["platform_position"]
     assert invoke("undo", "-p", better, "-o", back).exit_code == 0
     assert read_robot(back).effect == ()
 

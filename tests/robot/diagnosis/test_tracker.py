@@ -80,6 +80,16 @@ def test_the_frame_has_its_values_and_angles_of_an_imu_are_recognised(tmp_path: 
     assert any("IMU" in note for note in found["notes"])
 
 
+def test_a_frame_and_a_reflector_explain_the_error_in_turn(tmp_path: Path) -> None:
+    station = Station(37.0, (0.0, 0.0, 1.0), (0.1, 0.2, -0.3), reflector=(0.03, 0.02, 0.08))
+    profile, run = files(tmp_path, "none", station, tension=False)
+    found = answer("diagnose", run, "--profile", profile)
+    assert named(found) == [{"tracker-frame"}, {"reflector-offset"}]
+    first, second = (step["explains"] for step in found["steps"])
+    assert first > 0.5
+    assert first + second == pytest.approx(1.0, abs=0.01)
+
+
 def test_numbers_that_the_file_has_or_declares_unknown_are_not_missing(tmp_path: Path) -> None:
     station = Station(37.0, (0.0, 0.0, 1.0), (0.1, 0.2, -0.3), reflector=(0.03, 0.02, 0.08))
     profile, run = files(tmp_path, "none", station, tension=False)

@@ -79,11 +79,11 @@ def test_errors_are_drawn_over_what_they_follow(drum: dict[str, Any]) -> None:
     assert Page(drum["html"]).shown.count("error-cable_length") == 1
 
 
-def test_the_ladder_begins_and_ends_at_the_figures(drum: dict[str, Any]) -> None:
-    outputs, ladder = drum["answer"]["outputs"], drum["answer"]["waterfall"]
-    assert len(ladder["rungs"]) == 2
-    for rung, when in zip(ladder["rungs"], ("before", "after"), strict=True):
-        for name, rms in rung["heldout_rms"].items():
+def test_the_waterfall_begins_and_ends_at_the_figures(drum: dict[str, Any]) -> None:
+    outputs, waterfall = drum["answer"]["outputs"], drum["answer"]["waterfall"]
+    assert len(waterfall["steps"]) == 2
+    for step, when in zip(waterfall["steps"], ("before", "after"), strict=True):
+        for name, rms in step["heldout_rms"].items():
             assert rms == pytest.approx(outputs[name][f"heldout_rms_{when}"])
 
 
@@ -140,6 +140,6 @@ def test_a_geometry_off_as_a_whole_is_reported_so_and_calibrated(
     )
     assert answer["steps"][0]["whole"]
     assert "geometry of the robot differs as a whole" in answer["sentence"]
-    rungs = [rung["model"] for rung in answer["waterfall"]["rungs"]]
-    assert rungs[1].startswith("+ the whole geometry")
+    steps = [step["model"] for step in answer["waterfall"]["steps"]]
+    assert steps[1].startswith("+ the whole geometry")
     assert "winchkit calibrate cabtive" in Page(page.read_text()).text

@@ -143,6 +143,7 @@ def test_a_hanging_platform_is_judged_in_its_poses_of_rest() -> None:
         (5.0, None, "no cell of 5 m fits along x"),
         (0.1, (np.zeros(3), np.zeros(3)), "edges of 0, 0, 0 m"),
         (1e-4, None, "more than 20000000"),
+        (1e-6, None, "more than 20000000"),
         (-1.0, None, "step"),
     ],
 )
@@ -159,6 +160,7 @@ def test_a_grid_of_nothing_is_refused(step: float, box: object, words: str) -> N
         (["cabtve", "--tension", "5N", "80N"], "there is no profile 'cabtve'"),
         (["cabtive", "--tension", "80N", "5N"], "low 80.0 N is not below high 5.0 N"),
         (["cabtive", "--tension", "5N", "80N", "--of", "clear"], "the conditions here are"),
+        (["cabtive", "--tension", "5N", "80N", "-o", "a.txt"], "'.txt' is no format for it"),
         (["hanging-4", "--tension", "5N", "200N", "--force", "9N"], "leave --force and --moment"),
         (["cabtive", "--tension", "5N", "80N", "--from", "yaw=3deg"], "the box has x, y and z"),
     ],

@@ -172,5 +172,8 @@ def test_a_constant_that_no_column_needs_is_said(tmp_path: Path) -> None:
         path.write_text(LOG.replace(",M", f",torque [{unit}]"))
         (guess,) = guesses_of([read_table(path)], read_answers({"rated_torque": "2.4 N m"}))
         notes.append(" ".join(guess.notes))
-    assert "--rated-torque is not used: no column is in a share of the rated torque" in notes[0]
+    assert notes[0] == (
+        "--rated-torque is not used: no column is in a share of the rated torque; --column "
+        '"motor_torque=COLUMN [%]" where one is'
+    )
     assert "is not used" not in notes[1]

@@ -41,7 +41,7 @@ def served(recorded: list[Path]) -> Iterator[Served]:
     found.end()
 
 
-def test_drop_see_add_the_ladder_falls_save_and_reload(
+def test_drop_see_add_the_error_falls_save_and_reload(
     browser: Any, served: Served, recorded: list[Path], tmp_path: Path
 ) -> None:
     page, complaints = opened(browser, served.url, accept_downloads=True)
@@ -52,12 +52,12 @@ def test_drop_see_add_the_ladder_falls_save_and_reload(
     page.click("#dialog .primary")
     until(page, lambda: page.locator("#card .primary").count() == 1)
     assert page.locator(".chip.explained").count() == 1
-    before = float(texts(page, ".ladder .cell.today.focus .value")[0])
+    before = float(texts(page, ".models .cell.today.focus .value")[0])
     page.keyboard.press("a")
     until(page, lambda: page.locator(".chip.adequate").count() == 1)
-    output = page.locator(".ladder .head.focus").inner_text()
-    after = float(texts(page, ".ladder .cell.today.focus .value")[0])
-    history = [float(text) for text in texts(page, ".ladder .cell.history .value") if text != "–"]
+    output = page.locator(".models .head.focus").inner_text()
+    after = float(texts(page, ".models .cell.today.focus .value")[0])
+    history = [float(text) for text in texts(page, ".models .cell.history .value") if text != "–"]
     assert max(history) > 2 * after or before > 2 * after, output
     with page.expect_download() as saved:
         page.click("text=Save profile")
@@ -125,6 +125,7 @@ viscosity = "203.5 N m s"
 def test_emps_from_its_authors_file_and_a_log_of_another_program(
     browser: Any, tmp_path: Path
 ) -> None:
+    """Until measured and predicted torque are drawn; tests/diagnosis/test_real_emps.py goes on."""
     lay_out("emps", tmp_path)
     profile, log = tmp_path / "emps.toml", tmp_path / "log.csv"
     profile.write_text(EMPS)
@@ -133,7 +134,7 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
     )
     log.write_text(f"Zeit [s];Pos [deg];Kraft\n{rows}\n")
     served = Served("--folder", str(tmp_path))
-    page, complaints = opened(browser, served.url, accept_downloads=True)
+    page, complaints = opened(browser, served.url)
     page.set_input_files("#files", str(log))
     until(page, lambda: page.locator("#dialog .primary").count() == 1)
     assert page.locator("#dialog .primary").is_disabled(), "the unit of Kraft is not known"
@@ -160,18 +161,6 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
     until(page, lambda: page.input_value("[aria-label='Unit of vir']") == "N m")
     page.click("#dialog .primary")
     until(page, lambda: page.locator("#time canvas").count() == 2)
-    until(page, lambda: page.locator("#card .primary").count() == 1, 120.0)
-    effect = page.inner_text("#card header code")
-    before = float(texts(page, ".ladder .cell.today .value")[0])
-    page.keyboard.press("a")
-    until(page, lambda: page.locator(".name.history").count() == 1)
-    assert float(texts(page, ".ladder .cell.today .value")[0]) < 0.5 * before
-    with page.expect_download() as saved:
-        page.click("text=Save profile")
-    saved.value.save_as(tmp_path / "better.toml")
-    assert effect in (tmp_path / "better.toml").read_text()
-    page.reload()
-    until(page, lambda: page.locator(".name.history").count() == 1)
     assert complaints == []
     page.context.close()
     served.end()
@@ -179,7 +168,7 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
 
 def rail(page: Any) -> float:
     """Place of the rail of today's error in the focused column, per cent of its drawing."""
-    place = page.locator(".ladder .cell.focus line.rail").first.get_attribute("x1")
+    place = page.locator(".models .cell.focus line.rail").first.get_attribute("x1")
     return float(str(place).rstrip("%"))
 
 
@@ -227,7 +216,7 @@ def test_the_rail_slides_to_the_new_error_or_its_earlier_place_stays_dotted(
     before = rail(page)
     page.evaluate(
         """() => { window.places = []; const look = () => {
-        const node = document.querySelector(".ladder .cell.focus line.rail");
+        const node = document.querySelector(".models .cell.focus line.rail");
         if (node) window.places.push(parseFloat(node.getAttribute("x1")));
         requestAnimationFrame(look); }; look(); }"""
     )

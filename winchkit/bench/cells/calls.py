@@ -11,6 +11,7 @@ from typing import Any
 
 from winchkit.bench.cells.desk import check_permanent, full_name
 from winchkit.bench.cells.results import (
+    CellExchange,
     CellInfo,
     CellRate,
     CellTare,
@@ -21,6 +22,7 @@ from winchkit.bench.cells.results import (
 from winchkit.bench.cells.tasks import readings_of
 from winchkit.bench.remote.cell_session import at_cells
 from winchkit.calibration.cell.health import CellSamples, Health, examine, samples_of
+from winchkit.drivers.counters import Latency
 from winchkit.drivers.reading import InstrumentReading, Quality
 
 
@@ -70,7 +72,10 @@ def cell_rate(bench: str | Path, cell: str | None = None, *, duration: float = 3
     CellRate
         What ``winchkit cell rate --json`` prints.
     """
-    return CellRate(**_done("rate", bench, cell, duration))
+    told = _done("rate", bench, cell, duration)
+    cost, latency = told["exchange"], Latency(**told["latency"])
+    exchange = CellExchange(**cost) if cost else None
+    return CellRate(**{**told, "exchange": exchange, "latency": latency})
 
 
 def cell_health(bench: str | Path, cell: str | None = None, *, duration: float = 10.0) -> Health:

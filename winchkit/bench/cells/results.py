@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+
+from winchkit.drivers.counters import Latency
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,30 @@ class CellInfo:
 
 
 @dataclass(frozen=True)
+class CellExchange:
+    """Where the time of one reading on its line goes; None for what is not known of the line."""
+
+    baudrate: int | None
+    """Of a serial line, Bd."""
+    sharing: int | None = None
+    """Instruments on the line."""
+    line_rate: float | None = None
+    """Readings of this instrument that the line carries, 1/s."""
+    time: float | None = None
+    """Of the whole reading, s."""
+    bytes: int | None = None
+    """Of requests and replies."""
+    wire: float | None = None
+    """Of these bytes on the wire, s."""
+    silence: float | None = None
+    """Between frames, s."""
+    turnaround: float | None = None
+    """Of the device, s."""
+    queries: int | None = None
+    """Requests of one reading."""
+
+
+@dataclass(frozen=True)
 class CellRate:
     """Rate at which an instrument is read, and what limits it; rates in 1/s."""
 
@@ -86,12 +111,12 @@ class CellRate:
     """Key of ``limits``."""
     limits: Mapping[str, float]
     """Rates by what limits them."""
-    exchange: Mapping[str, Any]
-    """Where the time of one reading on its line goes, s; empty where the device sends by itself."""
+    exchange: CellExchange | None
+    """Where the time of one reading on its line goes; None where the device sends by itself."""
     duplicates: float
     """Share of readings with the counts of the one before."""
-    latency: Mapping[str, float]
-    """From request to receipt, s: quantiles and the worst."""
+    latency: Latency
+    """From request to receipt."""
     counters: Mapping[str, int]
     """As of :class:`CellInfo`."""
     advice: str

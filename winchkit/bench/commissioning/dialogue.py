@@ -58,12 +58,14 @@ class TypedAnswers:
             self.show(question)
             line = self._read()
             if not line:
-                raise NotPermitted(f"the input ended at the question '{key}'; nothing was recorded")
+                raise NotPermitted(
+                    f"the input ended without an answer to: {question} Nothing was recorded."
+                )
             answer = _as_offered(line.strip(), choices)
             if answer and (not choices or answer in choices):
                 return answer
             if answer:
-                self.show(f"'{answer}': type {' or '.join(choices)}")
+                self.show(f"'{answer}' is no answer here: type {_offered(choices)}")
 
 
 class AnswerFile:
@@ -90,7 +92,7 @@ class AnswerFile:
         answer = _as_offered(str(found).strip(), choices)
         if choices and answer not in choices:
             raise UsageError(
-                f"{self._path}: {key} is '{answer}', not one of {', '.join(choices)}; nothing was "
+                f"{self._path}: {key} is '{answer}': write {_offered(choices)}; nothing was "
                 "recorded"
             )
         self.show(f"{question} {answer}")
@@ -102,14 +104,22 @@ def _as_offered(answer: str, choices: tuple[str, ...]) -> str:
     return answer.casefold() if choices else answer
 
 
+def _offered(choices: tuple[str, ...]) -> str:
+    """The choices in words, without the short ones for yes and no."""
+    return " or ".join(("yes", "no") if choices == YES_OR_NO else choices)
+
+
 def agreed(answer: str) -> bool:
     """Whether an answer is yes; everything else is not."""
     return answer.casefold() in _YES
 
 
 def confirm(dialogue: Dialogue, key: str, question: str) -> str:
-    """An answer that is yes; raises NotPermitted for no."""
+    """An answer that is yes; raises NotPermitted for no, with the ``key`` that a file uses."""
     answer = dialogue.ask(key, f"{question} [yes/no]", YES_OR_NO)
     if agreed(answer):
         return answer
-    raise NotPermitted(f"not confirmed: {question} Nothing was recorded ({key}).")
+    raise NotPermitted(
+        f"the answer was no: {question} Nothing was recorded. Put this right, then begin "
+        f"again ({key})."
+    )

@@ -20,6 +20,8 @@ _AGREES = 0.1
 change the arm by some per cent)."""
 _RESOLUTION = 2e-3
 """Of a length sensor beside its own error in proportion, m."""
+_SHOWN = 5e-5
+"""m: below it a length in mm reads 0.0, and has no direction."""
 _LOOK = 0.5
 """s: the load has ceased to bounce, and a cell of 10 Hz gives five readings."""
 _PAUSE = 0.02
@@ -79,8 +81,9 @@ class Motions:
         )
         if abs(moved.cable - change) > _RESOLUTION + _AGREES * abs(change):
             raise NotPermitted(
-                f"winch {self._name}: {change * 1e3:.1f} mm of cable were commanded and the motor "
-                f"moved {moved.cable * 1e3:.1f} mm; check its units and what holds it"
+                f"winch {self._name}: it should have {by_way(change)}, and by the motor it "
+                f"{by_way(moved.cable)}; check the drive's counts per turn, the gear ratio, and "
+                "whether something holds the motor"
             )
         return moved
 
@@ -100,9 +103,9 @@ class Motions:
         """Raise NotPermitted where the length sensor and the profile disagree."""
         if abs(moved.sensor - moved.cable) > _RESOLUTION + _AGREES * abs(moved.cable):
             raise NotPermitted(
-                f"winch {self._name}: the length sensor measured {moved.sensor * 1e3:.1f} mm, the "
-                f"motor turned {moved.cable * 1e3:.1f} mm by the profile; check "
-                "increments_per_turn, gear ratio, drum radius and reeving"
+                f"winch {self._name}: by the motor and the profile it {by_way(moved.cable)}, by "
+                f"the length sensor it {by_way(moved.sensor)}; check increments_per_turn, gear "
+                "ratio, drum radius and reeving"
             )
 
     def tension(self) -> float:
@@ -119,3 +122,14 @@ class Motions:
             )
         self.cell_noise = max(1e-3, _SIGMAS * statistics.pstdev(good))
         return statistics.fmean(good)
+
+
+def by_way(length: float) -> str:
+    """What a winch did with a length of cable (m, positive pays out), in words."""
+    verb = "wound in" if length < 0 else "paid out"
+    return f"{verb if abs(length) >= _SHOWN else 'moved'} {millimetres(abs(length))}"
+
+
+def millimetres(length: float) -> str:
+    """A length in mm."""
+    return f"{length * 1e3:.1f} mm"

@@ -26,7 +26,7 @@ from winchkit.bench.commissioning.dialogue import (
     agreed,
     confirm,
 )
-from winchkit.bench.commissioning.motions import Motions
+from winchkit.bench.commissioning.motions import Motions, by_way, millimetres
 from winchkit.bench.commissioning.record import (
     CommissioningRecord,
     Confirmation,
@@ -197,8 +197,9 @@ class _Steps:
 
     def _brake(self, trials: Trials) -> None:
         question = (
-            f"winch {self._name}: the drive will be enabled at rest. Type 'unloaded' if no load "
-            "hangs on the cable, or 'brake' if a brake holds it (the brake is tried now):"
+            f"winch {self._name}: next, the drive is enabled at rest. Does a load hang on the "
+            "cable? Type 'unloaded' if none does, or 'brake' if a brake holds it (the brake is "
+            "then tried at once):"
         )
         answer = self._dialogue.ask(f"{self._name}.brake", question, ("unloaded", "brake"))
         if answer == "unloaded":
@@ -212,18 +213,18 @@ class _Steps:
         seen = trials.brake(self._name)
         if not seen.stopped:
             raise NotPermitted(
-                f"winch {self._name}: {seen.after:g} s after it was disabled the drive is "
-                f"{seen.state}; the brake cannot be tried on a drive that holds the load. Nothing "
-                "was recorded"
+                f"winch {self._name}: {seen.after:g} s after the command to disable, the drive is "
+                f"'{seen.state}' and holds the load itself, so that nothing is known of the brake. "
+                "Nothing was recorded; look at what keeps the drive enabled (605Ch, its inputs)"
             )
         if abs(seen.travel) > _SLIP:
             raise NotPermitted(
-                f"winch {self._name}: the cable moved {seen.travel * 1e3:.1f} mm in "
-                f"{seen.after:g} s after the drive was disabled (limit {_SLIP * 1e3:g} mm); the "
-                "brake does not hold"
+                f"winch {self._name}: the brake does not hold: in {seen.after:g} s after the "
+                f"drive was disabled it {by_way(seen.travel)} (limit {_SLIP * 1e3:g} mm). Nothing "
+                "was recorded; secure the load and repair the brake"
             )
-        text = f"winch {self._name}: with the drive disabled the cable moved {_mm(seen.travel)}."
-        held = confirm(self._dialogue, f"{self._name}.brake_held", f"{text} The brake held?")
+        text = f"winch {self._name}: with the drive disabled it {by_way(seen.travel)}."
+        held = confirm(self._dialogue, f"{self._name}.brake_held", f"{text} Did the brake hold?")
         self._note("brake", f"{question} {text}", f"{answer}, {held}", slip=seen.travel)
 
     def _host_silent(self, trials: Trials, speed: float) -> TrialResult:
@@ -231,14 +232,14 @@ class _Steps:
         seen = trials.host_loss(self._name, speed)
         if not seen.stopped:
             raise NotPermitted(
-                f"winch {self._name}: the computer fell silent with the drive enabled {where}, "
-                f"and after {seen.after:.2f} s the drive was still {seen.state}; it would go on "
-                "moving when the computer fails. Nothing was recorded"
+                f"winch {self._name}: when the computer fails, this drive goes on moving: "
+                f"{seen.after:.2f} s after the last message it was still '{seen.state}' ({where}). "
+                "Nothing was recorded; set its reaction (docs/howto/drive.md, host_loss)"
             )
         text = (
-            f"winch {self._name}: the computer fell silent with the drive enabled {where}. The "
-            f"drive went to {seen.state} after {seen.after:.3f} s and the cable moved "
-            f"{_mm(seen.travel)}."
+            f"winch {self._name}: the computer fell silent with the drive enabled {where}. "
+            f"{seen.after:.3f} s later the drive was '{seen.state}'; until it was at rest it "
+            f"{by_way(seen.travel)}."
         )
         item = "host loss in motion" if speed else "host loss"
         key = f"{self._name}.{item.replace(' ', '_')}"
@@ -249,8 +250,8 @@ class _Steps:
     def _moving(self, trials: Trials) -> TrialResult | None:
         speed = _slow(self._wiring)
         question = (
-            f"winch {self._name}: let the computer fall silent also in motion? 'yes' winds in "
-            f"at {speed:g} m/s for 0.8 s, 'no' leaves this test out."
+            f"winch {self._name}: try the same in motion? 'yes' winds in at {speed:g} m/s for "
+            "0.8 s, then the computer falls silent; 'no' leaves this test out."
             f"{trials.room(self._name)}"
         )
         answer = self._dialogue.ask(f"{self._name}.try_in_motion", question, YES_OR_NO)
@@ -259,16 +260,16 @@ class _Steps:
     def _nmt(self, trials: Trials) -> None:
         seen = trials.nmt_stopped(self._name)
         self._stops_on_nmt = seen.stopped
-        verb = "leaves" if seen.stopped else "does not leave"
-        text = f"winch {self._name}: on NMT stopped the drive {verb} operation enabled"
-        self._dialogue.show(f"{text} ({seen.state}).")
+        verb = "switches off" if seen.stopped else "does not switch off"
+        text = f"winch {self._name}: the drive {verb} when its node is stopped (NMT)"
+        self._dialogue.show(f"{text}; it was then '{seen.state}'.")
         self._note("NMT stopped", text, "measured", after=seen.after)
 
     def _direction(self, motions: Motions) -> None:
         step = motions.step
         pays_out = motions.has_room(step)
         verb = "pay out" if pays_out else "wind in"
-        go = f"winch {self._name}: it will {verb} {_mm(step)} of cable. Begin?"
+        go = f"winch {self._name}: next, it will {verb} {millimetres(step)}. Begin?"
         confirm(self._dialogue, f"{self._name}.direction_go", go)
         change = step if pays_out else -step
         moved = motions.go(change)
@@ -281,7 +282,7 @@ class _Steps:
         name = self._name
         sign = 1.0 if motions.has_room(turn) else -1.0
         verb = "pay out" if sign > 0 else "wind in"
-        go = f"winch {name}: the motor will make one turn and {verb} {_mm(turn)}. Begin?"
+        go = f"winch {name}: next, the motor makes one turn: {verb} {millimetres(turn)}. Begin?"
         confirm(self._dialogue, f"{name}.units_go", go)
         moved = motions.go(sign * turn)
         measured = {"turns": moved.turns, "cable": moved.cable}
@@ -289,13 +290,13 @@ class _Steps:
             measured["length sensor"] = moved.sensor
             motions.check_sensor(moved)
             question = (
-                f"winch {name}: the length sensor measured {_mm(moved.sensor)} for "
-                f"{_mm(moved.cable)} by the profile. Did the motor make one turn?"
+                f"winch {name}: by the length sensor it {by_way(moved.sensor)}, by the profile "
+                f"{millimetres(abs(moved.cable))}. Did the motor make one turn?"
             )
         else:
             question = (
-                f"winch {name}: did the motor make one turn, and the cable move by {_mm(turn)}, as "
-                "measured at the drum or with a tape?"
+                f"winch {name}: did the motor make one turn, and the cable move by "
+                f"{millimetres(turn)} as measured with a tape?"
             )
         answer = confirm(self._dialogue, f"{name}.units", question)
         self._note("units", question, answer, **measured)
@@ -303,23 +304,24 @@ class _Steps:
     def _cell(self, motions: Motions) -> None:
         name, before = self._name, motions.tension()
         question = (
-            f"winch {name}: the cell reads {before:.1f} N. If a known load hangs now and this is "
-            "its tension, answer 'right'. Else pull on the cable, or hang a load on it and leave "
-            "it there, and answer 'pulled'"
+            f"winch {name}: the cell reads {before:.1f} N. Type 'right' if a known load hangs now "
+            "and this is its tension. Else hang a load on the cable, or pull on it and go on "
+            "pulling, and type 'pulled':"
         )
         answer = self._dialogue.ask(f"{name}.cell", question, ("pulled", "right"))
         after = motions.tension()
         if answer == "pulled":
             if after - before <= motions.cell_noise:
                 raise NotPermitted(
-                    f"winch {name}: the cell read {before:.1f} N and then {after:.1f} N; a pull "
-                    "must raise it. Check its sign (`scale` of its device file), its wiring, and "
-                    "whether it is on this cable"
+                    f"winch {name}: a pull must raise the cell's reading: it was {before:.1f} N "
+                    f"and then {after:.1f} N. Nothing was recorded; check its sign (`scale` of its "
+                    "device file), its wiring, and whether it is on this cable"
                 )
         elif not after > motions.cell_noise:
             raise NotPermitted(
-                f"winch {name}: the cell reads {after:.1f} N, which is within its noise; hang a "
-                "known load on the cable, or pull on it"
+                f"winch {name}: the cell reads {after:.1f} N, no more than its noise of "
+                f"{motions.cell_noise:.1f} N. Nothing was recorded; hang a known load on the "
+                "cable, or pull on it"
             )
         self._note("cell", question, answer, before=before, after=after)
 
@@ -334,7 +336,7 @@ class _Steps:
             shown.append(f"length {limits.length[0]:g} to {limits.length[1]:g} m")
         missing = [key for key in ("length", "tension_high") if getattr(limits, key) is None]
         lacking = f"; NOT limited: {', '.join(missing)}" if missing else ""
-        question = f"winch {self._name}: limits: {', '.join(shown)}{lacking}. Right?"
+        question = f"winch {self._name}: limits: {', '.join(shown)}{lacking}. Are they right?"
         answer = confirm(self._dialogue, f"{self._name}.limits", question)
         self._note("limits", question, answer)
 
@@ -352,10 +354,6 @@ def _slow(wiring: WinchWiring) -> float:
     """Speed of the motions of a commissioning, m/s."""
     limit = wiring.limits.speed
     return min(limit, max(_SLOWEST, min(_FASTEST, _SLOW * limit)))
-
-
-def _mm(length: float) -> str:
-    return f"{length * 1e3:.1f} mm"
 
 
 def _now() -> str:

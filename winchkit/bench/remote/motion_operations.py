@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping
+from dataclasses import asdict
 from typing import Any
 
 from winchkit.bench.control.dead_man import DEAD_MAN, LIFE_SIGN, DeadMan, remaining
@@ -253,7 +254,7 @@ class MotionStation(BaseStation):
             By cable ``force`` and ``measured``, N, and ``missing``, of the forces that balance each
             other; ``position_error``, m, and ``rotation_error``, rad. None for what is not held.
         """
-        return self._bench.robot.held()
+        return asdict(self._bench.robot.held())
 
     @operation()
     def take_over(self, winch: str | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import degrees
+from re import compile as pattern
 
 from winchkit.cli.core.quantities import check_typed, quantity
 from winchkit.errors import UsageError, suggest
@@ -15,12 +16,14 @@ COORDINATES = {
     "pitch": "angle",
     "yaw": "angle",
 }
+_BETWEEN = pattern(r",(?!\s*\d)")
+"""A comma before a digit is that of a number, which is refused as such."""
 
 
 def read_pose(text: str) -> dict[str, float]:
     """Coordinates that ``x=1 m,yaw=5 deg`` names, m and rad; raises UsageError."""
     found: dict[str, float] = {}
-    for part in text.split(","):
+    for part in _BETWEEN.split(text):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if name not in COORDINATES or not equals:
             known = ", ".join(COORDINATES)

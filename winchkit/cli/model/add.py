@@ -169,14 +169,14 @@ def _tell(output: str, data: dict[str, Any], fitted: Addition | Removal | None) 
 def ledger(profile: str, html: str | None) -> None:
     """List every effect that was added to or removed from a profile, and the errors then."""
     from winchkit.profile_edit import history
-    from winchkit.report.pages.history import ladder_html, ladder_text
+    from winchkit.report.pages.history import history_html, history_text
 
     declared = declared_profile(find("profiles", profile))
     steps = history.ledger(declared)
     told = {"profile": declared.name, "steps": [step.to_json() for step in steps]}
-    tell(told, [ladder_text(declared.name, steps)])
+    tell(told, [history_text(declared.name, steps)])
     if html:
-        write_page(html, ladder_html(declared.name, steps))
+        write_page(html, history_html(declared.name, steps))
 
 
 @click.command(

@@ -144,7 +144,7 @@ def _suggest(
         suggest_next("import", runs, "--column", column, "-o", "corrected")
         return
     from winchkit.report.words.sentence import unrelated_outputs
-    from winchkit.report.words.steps import reported
+    from winchkit.report.words.steps import needs_calibration, reported
 
     if unrelated_outputs(diagnosis):
         return
@@ -154,7 +154,7 @@ def _suggest(
     told = reported(diagnosis).steps
     first = next(iter(told), None)
     words = ("-p", asked.profile, *asked.options)
-    if any(step.whole for step in told):
+    if any(map(needs_calibration, told)):
         file = extended_name(asked.profile, "calibrated")
         suggest_next("calibrate", asked.profile, runs, "-o", file)
     elif diagnosis.verdict == "unknown" and diagnosis.data == "runs":

@@ -189,7 +189,7 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
     from winchkit.sim import choose_bench
 
     started, out = time.monotonic(), output
-    story = _Story(quiet=is_json())
+    story = _Sentences(quiet=is_json())
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
     with _progress(_RECORDING_SECONDS) as progress:
@@ -221,7 +221,7 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
     ctx.exit(0 if right else 1)
 
 
-class _Story:
+class _Sentences:
     """Sentences that are printed and kept for the report."""
 
     def __init__(self, quiet: bool) -> None:
@@ -240,7 +240,7 @@ class _Story:
         click.echo("\n".join(paragraph(text, then="  ")), err=self._quiet)
 
 
-def _add_errors(story: _Story, comparison: Comparison, findings: LoopResult) -> None:
+def _add_errors(story: _Sentences, comparison: Comparison, findings: LoopResult) -> None:
     from winchkit.report.words.headline import size_texts
     from winchkit.report.words.sentence import capital
     from winchkit.report.words.vocabulary import OUTPUT_NAMES
@@ -253,7 +253,7 @@ def _add_errors(story: _Story, comparison: Comparison, findings: LoopResult) -> 
 
 
 def _write_report(
-    out: Path, story: _Story, findings: LoopResult, profile_name: str, hidden: str
+    out: Path, story: _Sentences, findings: LoopResult, profile_name: str, hidden: str
 ) -> Path:
     from winchkit.cli.model.options import save_page
     from winchkit.report.pages.pages import report_html

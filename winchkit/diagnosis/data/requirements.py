@@ -53,6 +53,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "half_turn": turns >= _LEAST_TURN and not is_joint,
         "torque": "motor_torque" in dataset.outputs,
         "prediction": any(r.raw.at.predicted_torque is not None for r in recordings),
+        "load_mass": None not in payloads,
         "payloads": None not in payloads and len(payloads) > 1,
         "inertia": bool(profile.motor.inertia),
         "cell": any(r.raw.load is not None for r in recordings) or _tension_is_input(dataset),

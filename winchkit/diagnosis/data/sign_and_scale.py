@@ -85,7 +85,7 @@ def sign_and_scale(
     }
     for run, own in zip(runs, every, strict=True):
         slopes = {name: slope for name, slope in own.items() if name not in scattered}
-        for (channel, other), slope in _suspects(run, slopes).items():
+        for (channel, other), slope in _wrong_channels(run, slopes).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
             wrong.setdefault((channel, other, code), []).append((run.name, slope))
     out = []
@@ -194,7 +194,7 @@ def _rows(
     }
 
 
-def _suspects(run: Run, slopes: Mapping[str, Slope]) -> dict[tuple[str, str], Slope]:
+def _wrong_channels(run: Run, slopes: Mapping[str, Slope]) -> dict[tuple[str, str], Slope]:
     """Channels with a wrong sign or scale, and the channel that may be wrong instead.
 
     That is the load where tension and torque agree on one; tension or torque where no load is

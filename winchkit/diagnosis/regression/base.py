@@ -47,6 +47,13 @@ class Folds:
     count: int
 
 
+_CORRECTION = (-0.25, 0.0)
+"""Range of the correction of second differences, in squared intervals; theory: -1/12 for exact
+samples, none for a rate of the drive's own. Measured: 25 right models lie between -0.14 and 0
+where their deviation is below 0.1; a free one took the place of a lag (2.3) or of inertia (-1.4)
+in the errors of the unchanged profile."""
+
+
 class Regression(ABC):
     """A nonlinear regression problem with effects, nuisance parameters and initial states.
 
@@ -251,6 +258,8 @@ class Regression(ABC):
         count = self.nuisance_columns.shape[1]
         low = [np.full(count, -np.inf), *(pair[0] for pair in pairs)]
         high = [np.full(count, np.inf), *(pair[1] for pair in pairs)]
+        if self.fits_discretization:
+            low[0][-1], high[0][-1] = _CORRECTION
         for term, start in zip(like.terms, like.starts, strict=True):
             if start:
                 parameter = term.effect.parameter(START)

@@ -21,7 +21,7 @@ from scipy.special import ndtr
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
-from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.gls import Fit, beyond_bounds
 from winchkit.diagnosis.regression.noise import BandNoise
 
 _TOUCHED = 0.02
@@ -48,8 +48,9 @@ def extrapolation(regression: Regression, fit: Fit, noise: BandNoise, folds: Fol
     It is computed per output in its unit: noise that is strongest at low frequencies makes an
     offset or a drift less certain than the whitened rows show.
     """
-    shared = _shared(regression, fit)
-    columns = _in_time(regression, shared * noise.inverse_sigma(regression)[:, None])
+    inverse_sigma = noise.inverse_sigma(regression)
+    shared = _shared(regression, fit, inverse_sigma)
+    columns = _in_time(regression, shared * inverse_sigma[:, None])
     plain = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
     output = np.concatenate([np.full(s.band.count, s.output) for s in regression.segments])
@@ -74,7 +75,8 @@ def held_out(regression: Regression, fit: Fit, noise: BandNoise, folds: Folds) -
     keep their own run's values, whatever is held out."""
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
-    columns = _in_time(regression, _shared(regression, fit) * inverse_sigma[:, None])
+    shared = _shared(regression, fit, inverse_sigma)
+    columns = _in_time(regression, shared * inverse_sigma[:, None])
     fold = np.concatenate(folds.of)
     left = _left_out(residual, columns, fold, folds.count)
     return np.asarray(np.bincount(fold, weights=left**2, minlength=folds.count), dtype=float)
@@ -94,7 +96,7 @@ def held_out_samples(
     """Held-out error of every sample, one array per segment, SI."""
     inverse_sigma = noise.inverse_sigma(regression)
     white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
-    shared = _shared(regression, fit)
+    shared = _shared(regression, fit, inverse_sigma)
     columns = _in_time(regression, shared * inverse_sigma[:, None])
     steps = _steps(white, columns, np.concatenate(folds.of), folds.count)
     plain = np.concatenate(regression.in_time(fit.residual))
@@ -160,10 +162,18 @@ def _signed_rank_tail(differences: Array) -> float:
     return float(ndtr((n * (n + 1) / 4 - rank_sum) / np.sqrt(variance)))
 
 
-def _shared(regression: Regression, fit: Fit) -> Array:
-    """Derivatives by the unknowns of all runs, without offsets and states of single runs."""
-    states = sum(len(start) for start in fit.hypothesis.starts)
-    return fit.jacobian[:, regression.n_run_offsets : fit.jacobian.shape[1] - states]
+def _shared(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
+    """Derivatives by the unknowns of all runs, without offsets and states of single runs; zero by
+    those at a bound, which stay there whatever is held out; a curve has none. Its columns come
+    before the states.
+    """
+    like, states = fit.hypothesis, sum(len(start) for start in fit.hypothesis.starts)
+    shared = fit.jacobian[:, : fit.jacobian.shape[1] - states].copy()
+    bounded = slice(len(fit.vector) - states)
+    gradient = shared[:, bounded].T @ (fit.residual * inverse_sigma**2)
+    low, high = (bound[bounded] for bound in regression.bounds(like))
+    shared[:, bounded][:, beyond_bounds(fit.vector[bounded], (low, high), gradient)] = 0.0
+    return shared[:, regression.n_run_offsets :]
 
 
 def _in_time(regression: Regression, columns: Array) -> Array:

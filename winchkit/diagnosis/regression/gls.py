@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Regression
@@ -390,17 +391,16 @@ class _LocalModel:
         x: Array,
         bounds: tuple[Array, Array],
     ) -> None:
-        low, high = bounds
         gradient, normal = _normal_equations(jacobian, residual, inverse_sigma)
-        at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
-        self._free = ~at_bound & (np.diag(normal) > 0)
+        held = beyond_bounds(x, bounds, gradient)
+        self._free = ~held & (np.diag(normal) > 0)
         inner = normal[np.ix_(self._free, self._free)]
         self._scale = np.sqrt(np.diag(inner))
         scaled = inner / np.outer(self._scale, self._scale)
         # Linearly dependent unknowns stay where they are: truncated eigenvalues.
         values, vectors = np.linalg.eigh(scaled) if len(scaled) else (np.zeros(0), scaled)
         kept = values > _LEAST_EIGENVALUE * np.max(values, initial=0.0)
-        self.rank = int(np.count_nonzero(kept) + np.count_nonzero(at_bound & (np.diag(normal) > 0)))
+        self.rank = int(np.count_nonzero(kept) + np.count_nonzero(held & (np.diag(normal) > 0)))
         self._values, self._vectors = values[kept], vectors[:, kept]
         self._along = self._vectors.T @ (gradient[self._free] / self._scale)
 
@@ -428,6 +428,15 @@ class _LocalModel:
             middle = np.sqrt(low * high)
             low, high = (middle, high) if length(middle) > region.radius else (low, middle)
         return high
+
+
+def beyond_bounds(x: Array, bounds: tuple[Array, Array], gradient: Array) -> NDArray[np.bool_]:
+    """Mask of the unknowns at a bound beyond which χ² would fall, (n_unknowns,): they stay there.
+
+    ``gradient`` is that of the fit, Jacobianᵀ times residual, both whitened.
+    """
+    low, high = bounds
+    return np.asarray(((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0)))
 
 
 def _normal_equations(

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, pi
+from math import inf, isfinite, pi
 
 from winchkit.diagnosis.regression.conditioning import collinearity
 from winchkit.diagnosis.regression.cross_validation import CERTAIN
@@ -102,12 +102,15 @@ def _by_id(fitted: Fit) -> Mapping[str, Term]:
 
 def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:
     """A step whose intervals contain its values in the models that differ in another step; it is
-    not certain where they differ by a tenth of the value.
+    not certain where they differ by a tenth of the value, or where one of them does without it.
     """
     effect = step.effects[0]
-    values, farthest = dict(step.parameters[effect]), (1.0, "")
+    values, farthest, always = dict(step.parameters[effect]), (1.0, ""), True
     for model in models:
-        if model.index == index or effect not in model.terms:
+        if model.index == index:
+            continue
+        if effect not in model.terms:
+            farthest, always = (inf, f"it is not needed {model.words}"), False
             continue
         for name, own in step.parameters[effect].items():
             change = _change(model.terms[effect], name, own)
@@ -130,7 +133,7 @@ def _widened(step: Step, index: int, models: Sequence[_OtherModel]) -> Step:
         step,
         parameters={**step.parameters, effect: values},
         doubts=doubts,
-        certain=step.certain and known,
+        certain=step.certain and always and known,
     )
 
 

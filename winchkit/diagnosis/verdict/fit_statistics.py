@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isfinite
 
 import numpy as np
@@ -88,16 +87,12 @@ def _values(
     """Values of every effect; the effects of the profile come first and have its values."""
     own = initial.hypothesis.terms
     return [
-        _value(term, name, estimate, _before(term, name, own[index] if known else None), profile)
+        _value(term, name, estimate, before[name], profile)
         for index, (term, values) in enumerate(estimates(regression, fit, spread))
         for known in [index < len(own) and own[index].effect.id == term.effect.id]
+        for before in [own[index].values if known else term.effect.null]
         for name, estimate in values.items()
     ]
-
-
-def _before(term: Term, name: str, own: Term | None) -> float:
-    values: Mapping[str, float] = term.effect.null if own is None else own.values
-    return values[name]
 
 
 def _value(

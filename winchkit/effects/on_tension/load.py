@@ -76,7 +76,7 @@ LOAD_OFFSET = Effect(
     looks_like="The same force in tension and torque at every load, in both directions.",
     confused_with=("load-gain", "cell-offset", "motor-coulomb-asymmetry"),
     told_apart="Tension and torque together; two loads distinguish it from a share of the load.",
-    needs=("cable", "payloads"),
+    needs=("cable", "load_mass"),
     left_out="it corrects the load that runs state; weigh the hook, and correct 'load_mass'",
 )
 

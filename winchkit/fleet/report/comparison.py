@@ -8,8 +8,8 @@ from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputEr
 from winchkit.fleet.diagnosis.anova import SharedAttribution, SharedError
 from winchkit.fleet.diagnosis.meta_analysis import Pooled, SharedEffect
 from winchkit.quantity_text import PrintScale, percent, quantity, scale_for, significant, unbroken
+from winchkit.report.figures.error_ratios import fleet_error_ratios
 from winchkit.report.figures.figure import Figure
-from winchkit.report.figures.ladder import fleet_ladders
 from winchkit.report.html.markup import Markup, compact, element, folded, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
@@ -215,7 +215,7 @@ def shared_effects_html(
     return _page(
         title,
         (*chip, headline, beside),
-        fleet_ladders(found),
+        fleet_error_ratios(found),
         _table(["winch", "verdict", "effects"], rows, 3),
         folded("shared", "Effects in common and in single winches", bullets(texts)),
         _as_json({"effects": [one.to_json() for one in shared], "alarms": dict(chances)}),
@@ -243,7 +243,7 @@ def shared_errors_html(
     return _page(
         title,
         (*chip, headline, beside),
-        fleet_ladders(found),
+        fleet_error_ratios(found),
         _table(head, linked, 1),
         folded("shared", "Share of the errors' variance explained by", bullets(texts)),
         _as_json({"outputs": {name: error.to_json() for name, error in shared.items()}}),

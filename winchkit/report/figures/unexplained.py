@@ -8,7 +8,7 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Step
 from winchkit.effects.empirical import shown_id
-from winchkit.profile_edit.history import LADDER_UNITS
+from winchkit.profile_edit.history import ERROR_UNITS
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
@@ -39,7 +39,7 @@ def unexplained_figures(answer: Answer, source: str = "") -> list[Figure]:
 def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
     at, residual = unexplained_curve(answer, where)
     how = reading(where.variable, within_turn=where.order is not None)
-    scale = scale_for(3 * float(abs(residual).max()), LADDER_UNITS[where.output])
+    scale = scale_for(3 * float(abs(residual).max()), ERROR_UNITS[where.output])
     noise = None
     if isinstance(answer, WinchAnswer):
         noise = answer.diagnosis.outputs[where.output].noise_rms
@@ -85,7 +85,7 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
     at = curve_of(regression, without, over)
     law = curve_of(regression, without - answer.result.final.residual, over)
     how = reading(over.variable, within_turn=over.order is not None)
-    scale = scale_for(3 * float(abs(at.mean).max()), LADDER_UNITS[over.output])
+    scale = scale_for(3 * float(abs(at.mean).max()), ERROR_UNITS[over.output])
     output, variable = output_name(over.output), variable_name(over.variable)
     drawn = tuple(
         FigureSeries(name, tone, how.shown(curve.x), curve.mean / scale.worth, "mean")

@@ -24,7 +24,7 @@ REFITTED_NAME = "refitted values"
 class Waterfall:
     """Held-out rms per output, SI, at every step."""
 
-    rungs: tuple[tuple[str, Mapping[str, float]], ...]
+    steps: tuple[tuple[str, Mapping[str, float]], ...]
     """The unchanged profile, then with each effect in the order of the steps."""
     first: Mapping[str, Mapping[str, float]]
     """By effect: the profile with it alone."""
@@ -42,28 +42,28 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     names = [whole.terms[index].label for index in added]
     before = {o: fit.heldout_rms_before for o, fit in diagnosis.outputs.items()}
     after = {o: fit.heldout_rms_after for o, fit in diagnosis.outputs.items()}
-    ladder = _Ladder(engine, answer.result, {added: after})
-    rungs: list[tuple[str, Mapping[str, float]]] = [("unchanged profile", before)]
+    subsets = _SubsetErrors(engine, answer.result, {added: after})
+    steps: list[tuple[str, Mapping[str, float]]] = [("unchanged profile", before)]
     first: dict[str, Mapping[str, float]] = {}
     if file_engine is not engine:
-        plain = _Ladder(file_engine, answer.result, {(): before})
-        rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
-        first[GEOMETRY_NAME] = ladder.error()
+        plain = _SubsetErrors(file_engine, answer.result, {(): before})
+        steps.append((f"+ {GEOMETRY_NAME}", subsets.error()))
+        first[GEOMETRY_NAME] = subsets.error()
     else:
-        plain = ladder
+        plain = subsets
         if any(step.refitted for step in diagnosis.steps):
-            rungs.append((f"+ {REFITTED_NAME}", ladder.error()))
-            first[REFITTED_NAME] = ladder.error()
+            steps.append((f"+ {REFITTED_NAME}", subsets.error()))
+            first[REFITTED_NAME] = subsets.error()
         else:
-            ladder.known[()] = before
-    rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
+            subsets.known[()] = before
+    steps += [(f"+ {name}", subsets.error(*added[: n + 1])) for n, name in enumerate(names)]
     first |= {name: plain.error(index) for name, index in zip(names, added, strict=True)}
     own = [
         GEOMETRY_NAME if step.whole else step.effects[0]
         for step in diagnosis.steps[: _n_own(answer)]
     ]
     last = dict(zip((*own, *names), errors_without(answer), strict=False))
-    return Waterfall(tuple(rungs), first, {name: rms for name, rms in last.items() if rms})
+    return Waterfall(tuple(steps), first, {name: rms for name, rms in last.items() if rms})
 
 
 def errors_without(answer: Answer) -> list[Mapping[str, float]]:
@@ -73,10 +73,10 @@ def errors_without(answer: Answer) -> list[Mapping[str, float]]:
     """
     engine, result = answer.engine, answer.result
     hypothesis, count = result.final.hypothesis, _n_own(answer)
-    ladder = _Ladder(engine, result, {})
-    out = [_without_own(answer, step, ladder) for step in answer.diagnosis.steps[:count]]
+    subsets = _SubsetErrors(engine, result, {})
+    out = [_without_own(answer, step, subsets) for step in answer.diagnosis.steps[:count]]
     indices = range(engine.n_initial_terms, len(hypothesis.terms))
-    return out + [ladder.of(hypothesis.without(index)) for index in indices]
+    return out + [subsets.of(hypothesis.without(index)) for index in indices]
 
 
 def falls_of(answer: Answer) -> list[tuple[Mapping[str, float], Mapping[str, float]]]:
@@ -88,10 +88,10 @@ def falls_of(answer: Answer) -> list[tuple[Mapping[str, float], Mapping[str, flo
     engine, result = answer.engine, answer.result
     added = tuple(range(engine.n_initial_terms, len(result.final.hypothesis.terms)))
     after = {name: output.heldout_rms_after for name, output in answer.diagnosis.outputs.items()}
-    ladder = _Ladder(engine, result, {added: after})
+    subsets = _SubsetErrors(engine, result, {added: after})
     own = answer.diagnosis.steps[: _n_own(answer)]
-    grown = [ladder.error(*added[:count]) for count in range(len(added) + 1)]
-    return [*((_without_own(answer, step, ladder), after) for step in own), *pairwise(grown)]
+    grown = [subsets.error(*added[:count]) for count in range(len(added) + 1)]
+    return [*((_without_own(answer, step, subsets), after) for step in own), *pairwise(grown)]
 
 
 def _n_own(answer: Answer) -> int:
@@ -100,24 +100,24 @@ def _n_own(answer: Answer) -> int:
     return max(0, len(answer.diagnosis.steps) - added)
 
 
-def _without_own(answer: Answer, step: Step, ladder: _Ladder) -> Mapping[str, float]:
+def _without_own(answer: Answer, step: Step, subsets: _SubsetErrors) -> Mapping[str, float]:
     engine, result = answer.engine, answer.result
     hypothesis = result.final.hypothesis
     terms = hypothesis.terms[: engine.n_initial_terms]
     if step.whole:
         added = range(engine.n_initial_terms, len(hypothesis.terms))
-        return _Ladder(answer.file_engine, result, {}).error(*added)
+        return _SubsetErrors(answer.file_engine, result, {}).error(*added)
     index = next((i for i, term in enumerate(terms) if term.effect.id == step.effects[0]), None)
     if index is None:
         return {}
     if step.refitted:
         held = result.initial_model.hypothesis.terms[index]
-        return ladder.of(hypothesis.with_term_at(index, held))
-    return ladder.of(hypothesis.without(index))
+        return subsets.of(hypothesis.with_term_at(index, held))
+    return subsets.of(hypothesis.without(index))
 
 
 @dataclass(frozen=True)
-class _Ladder:
+class _SubsetErrors:
     """Held-out errors of a model with some of its effects."""
 
     engine: SelectionEngine

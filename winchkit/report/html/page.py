@@ -32,7 +32,7 @@ def page(title: str, figures: Sequence[Figure], *content: Markup, headed: bool =
     return f'<!DOCTYPE html>\n<html lang="en">{_head(title)}{body}</html>\n'
 
 
-def figure_block(figure: Figure, width: float = WIDE, more: str = "") -> Markup:
+def figure_block(figure: Figure, width: float = WIDE) -> Markup:
     """A figure of a page with its buttons, which the script shows, and its caption."""
     name = figure.title
     zoom = [
@@ -57,7 +57,7 @@ def figure_block(figure: Figure, width: float = WIDE, more: str = "") -> Markup:
         tools,
         element("div", page_svg(figure, width), class_="canvas"),
         element("figcaption", figure.caption),
-        class_=f"figure {more}".rstrip(),
+        class_="figure",
         data_figure=figure.id,
     )
 

@@ -25,7 +25,7 @@ def addition_sections(
     better: str,
     *,
     title: str = "",
-    ladder: Figure | None = None,
+    ratios: Figure | None = None,
 ) -> Markup:
     """Content of the page; ``better`` is the profile that was written."""
     term, values = addition.added
@@ -36,7 +36,7 @@ def addition_sections(
     ]
     return join(
         [
-            _lead(addition, better, command, title=title, ladder=ladder),
+            _lead(addition, better, command, title=title, ratios=ratios),
             element("div", *figures, id="residuals"),
             folded(
                 "effects",
@@ -63,11 +63,11 @@ def addition_sentence(addition: Addition) -> str:
 
 
 def _lead(
-    addition: Addition, better: str, command: CommandLine, *, title: str, ladder: Figure | None
+    addition: Addition, better: str, command: CommandLine, *, title: str, ratios: Figure | None
 ) -> Markup:
     term, _ = addition.added
     chip, tone = _chip(addition.outputs)
-    beside = [_errors(addition.outputs), *([figure_block(ladder, 480, "ladder")] if ladder else [])]
+    beside = [_errors(addition.outputs), *([figure_block(ratios, 480)] if ratios else [])]
     rows = [
         ("Fitted to", compared_text(command.dataset, command.profile)),
         ("Error", addition_sentence(addition)),

@@ -30,13 +30,13 @@ def comparison_sections(
     command: CommandLine,
     *,
     title: str = "",
-    ladder: Figure | None = None,
+    ratios: Figure | None = None,
 ) -> Markup:
     """Content of the page; ``over`` is the main variable of each output's error."""
     profile = command.profile
     return join(
         [
-            _lead(comparison, over, command, title=title, ladder=ladder),
+            _lead(comparison, over, command, title=title, ratios=ratios),
             element("div", *figures, id="residuals"),
             folded("attribution", "Error of every output", _table(comparison)),
             folded("data", "Data", data(comparison)),
@@ -80,7 +80,7 @@ def _lead(
     command: CommandLine,
     *,
     title: str,
-    ladder: Figure | None,
+    ratios: Figure | None,
 ) -> Markup:
     outputs = comparison.outputs
     texts = [
@@ -88,7 +88,7 @@ def _lead(
         for name in worst_outputs(outputs)
     ]
     chip, tone = _chip(list(outputs.values()))
-    beside = [_sizes(comparison), *([figure_block(ladder, 480, "ladder")] if ladder else [])]
+    beside = [_sizes(comparison), *([figure_block(ratios, 480)] if ratios else [])]
     rows = [
         ("Compared", compared_text(command.dataset, command.profile)),
         ("Error", join(texts)),

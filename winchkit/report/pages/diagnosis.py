@@ -39,7 +39,7 @@ def sections(
     title: str = "",
     unexplained: Sequence[Figure] = (),
     open_laws: Sequence[Figure] = (),
-    ladder: Figure | None = None,
+    ratios: Figure | None = None,
 ) -> Markup:
     """Content of the page: summary and figures, and everything else to be opened."""
     diagnosis = answer.diagnosis
@@ -47,7 +47,7 @@ def sections(
     runs = diagnosis.data
     return join(
         [
-            _verdict(answer, command, title, ladder),
+            _verdict(answer, command, title, ratios),
             folded("story", "Procedure", _story(story)),
             element("div", *figures, id="residuals"),
             folded(
@@ -87,7 +87,7 @@ def sections(
     )
 
 
-def _verdict(answer: Answer, command: CommandLine, title: str, ladder: Figure | None) -> Markup:
+def _verdict(answer: Answer, command: CommandLine, title: str, ratios: Figure | None) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
     shown = f"Detectable with these {diagnosis.data}, among others: {listed(seen)}." if seen else ""
@@ -111,7 +111,7 @@ def _verdict(answer: Answer, command: CommandLine, title: str, ladder: Figure | 
         headline(diagnosis),
         rows,
         tables.figures(diagnosis),
-        *([figure_block(ladder, 480, "ladder")] if ladder else []),
+        *([figure_block(ratios, 480)] if ratios else []),
     )
 
 

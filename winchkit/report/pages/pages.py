@@ -11,8 +11,8 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.results import OutputError, OutputFit
 from winchkit.profile_edit.naming import extended_name
+from winchkit.report.figures.error_ratios import error_ratios, present
 from winchkit.report.figures.figure import Figure
-from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.maps import map_figures
 from winchkit.report.figures.residuals import OutputFigures, Residuals, residual_figures
 from winchkit.report.figures.unexplained import open_law_figures, unexplained_figures
@@ -41,7 +41,7 @@ def report_html(
     assert isinstance(answer, WinchAnswer), "of a winch"
     command = CommandLine(answer.engine.regression.dataset, profile, options)
     outputs = answer.diagnosis.outputs
-    ladder, drawn, cards = _drawn(outputs, residuals_of(answer, command.source))
+    ratios, drawn, cards = _drawn(outputs, residuals_of(answer, command.source))
     patterns = unexplained_figures(answer, command.source)
     laws = open_law_figures(answer, command.source)
     content = sections(
@@ -53,7 +53,7 @@ def report_html(
         title=title,
         unexplained=patterns,
         open_laws=laws,
-        ladder=ladder,
+        ratios=ratios,
     )
     html = page(title, [*drawn, *laws, *patterns], content, headed=False)
     return in_units_of(answer.engine.regression.dataset.profile, html)
@@ -121,10 +121,10 @@ def comparison_html(
     command = CommandLine(compared.regression.dataset, profile, options)
     residuals = residuals_of_comparison(compared, command.source)
     own = residual_figures(residuals)
-    ladder, drawn, cards = _drawn(compared.comparison.outputs, residuals, own)
+    ratios, drawn, cards = _drawn(compared.comparison.outputs, residuals, own)
     over = {one.output: one.followed for one in own if one.followed}
     content = comparison_sections(
-        compared.comparison, over, cards, command, title=title, ladder=ladder
+        compared.comparison, over, cards, command, title=title, ratios=ratios
     )
     return page(title, drawn, content, headed=False)
 
@@ -151,9 +151,9 @@ def addition_html(
     assert isinstance(fitted, FittedWinchAddition), "of a winch"
     command = CommandLine(fitted.regression.dataset, profile, options)
     residuals = residuals_of_addition(fitted, command.source)
-    ladder, drawn, cards = _drawn(fitted.addition.outputs, residuals)
+    ratios, drawn, cards = _drawn(fitted.addition.outputs, residuals)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
-    content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
+    content = addition_sections(fitted.addition, cards, command, better, title=title, ratios=ratios)
     html = page(title, drawn, content, headed=False)
     return in_units_of(fitted.regression.dataset.profile, html)
 
@@ -174,7 +174,7 @@ def _drawn(
     """Error of every output over its noise, that and all figures of the outputs, and a card of each
     output."""
     own = residual_figures(residuals) if own is None else own
-    ladder = error_ladder(
+    ratios = error_ratios(
         outputs,
         extended=residuals.after is not None,
         changed=residuals.changed,
@@ -187,4 +187,4 @@ def _drawn(
         for figure in (one.over_time, one.over_variable, *maps.get(one.output, ()))
         if figure is not None
     ]
-    return ladder, [*present(ladder), *every], drawings(own, maps, size_texts(outputs))
+    return ratios, [*present(ratios), *every], drawings(own, maps, size_texts(outputs))

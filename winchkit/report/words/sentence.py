@@ -16,7 +16,13 @@ from winchkit.effects.effect import told_apart
 from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.steps import cause, kinds_of, named_only, reported
+from winchkit.report.words.steps import (
+    cause,
+    kinds_of,
+    named_only,
+    needs_calibration,
+    reported,
+)
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -182,8 +188,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
     other, beyond = _CHANGES[diagnosis.data]
     if wrong := _instruments_text(diagnosis):
         return wrong
-    whole = any(step.whole for step in reported(diagnosis).steps)
-    if whole and diagnosis.verdict != "undecided":
+    if any(map(needs_calibration, reported(diagnosis).steps)) and diagnosis.verdict != "undecided":
         return "Calibrate the robot first: beside a wrong geometry an effect may imitate it."
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."

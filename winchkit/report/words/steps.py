@@ -17,6 +17,7 @@ from winchkit.report.words.vocabulary import (
     error_scale,
     kind,
     listed,
+    name_and_id,
     output_name,
     values_text,
     variable_name,
@@ -28,9 +29,12 @@ _LOWERED = 1.01
 """Ratio of the errors before and after a step from which it lowers an output's error."""
 _LEAST = 1e-3
 """Share below which no figure is shown."""
+_TENTH = 0.1
+"""Share of the excess of one output from which it is said; the tenth of the verdict."""
 _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
+_HOME = "the home pose of the robot is not that of the profile"
 _NEGLIGIBLE = 0.01
 """Share of the excess below which a refitted value that agrees with the file's is not reported, and
 a doubtful effect is named only."""
@@ -75,12 +79,6 @@ def reported(diagnosis: _D) -> _D:
 def explained_share(step: Step) -> float:
     """Share of the excess that a step explains beside those before it, or else beside all."""
     return step.explains if isfinite(step.explains) else step.share
-
-
-def _most_explained(step: Step) -> float:
-    """The larger of the shares beside those before it and beside all: the first of two frictions
-    imitates the second, which it does not replace."""
-    return max(explained_share(step), step.share if isfinite(step.share) else 0.0)
 
 
 def _is_negligible(step: Step) -> bool:
@@ -150,12 +148,19 @@ def step_title(step: Step) -> str:
         changed = f"{_refitted_values(step, with_errors=False)} in the profile"
         of_reversal = changed.startswith(_REVERSAL)
         return f"{effect_name(step.effects[0])}: {changed}" if of_reversal else changed
+    if needs_calibration(step):
+        return f"{_HOME}, or {listed([clause(effect) for effect in kinds_of(step)], 'or')}"
     if has_other_law(step):
         return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
     kinds = kinds_of(step)
     if len(kinds) > _MOST_KINDS:
         return f"one of {len(kinds)} effects is missing, which these data cannot distinguish"
     return listed([clause(effect) for effect in kinds], "or")
+
+
+def needs_calibration(step: Step) -> bool:
+    """Whether it is a robot's geometry, or may be its home pose."""
+    return step.whole or any(doubt.code == "home" for doubt in step.doubts)
 
 
 def has_other_law(step: Step) -> bool:
@@ -171,15 +176,22 @@ def step_text(
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
     ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
+    Beside an output that is thousands of times its noise off, any share of all is small: the share
+    of the excess of that one output is said where it is a tenth and that of all is no figure.
     """
-    parts = [_titled_values(step)]
+    parts, there = [_titled_values(step)], 0.0
     if outputs and fall and (name := lowered_most(fall)):
         before, after = fall
         scale = error_scale(outputs[name])
         was = significant(before[name] / scale.worth)
         parts.append(f"{output_name(name)} {was} → {scale.text(after[name])}")
+        first, noise = outputs[name].heldout_rms_before, {name: outputs[name].noise_rms}
+        whole, *left = (excess({name: e}, noise) for e in (first, before[name], after[name]))
+        there = (left[0] - left[1]) / whole if whole else 0.0
     share = explained_share(step)
-    if isfinite(share):
+    if share < _LEAST and there >= _TENTH:
+        parts.append(f"explains {percent(min(1.0, there))} of its excess, {percent(share)} of all")
+    elif isfinite(share):
         parts.append(f"explains {percent(share) if share >= _LEAST else 'under 0.1 %'}")
     return "; ".join(parts)
 
@@ -209,8 +221,9 @@ def alike(step: Step) -> dict[str, float]:
 
 
 def _alternatives(step: Step, data: str) -> list[str]:
-    same = list(alike(step))
-    others = [effect for effect in step.effects[1:] if effect not in same]
+    equal = alike(step)
+    same = [name_and_id(effect) for effect in equal]
+    others = [name_and_id(effect) for effect in step.effects[1:] if effect not in equal]
     out = [f"these {data} cannot distinguish it from {listed(same)}"] if same else []
     if others:
         out.append(f"these {data} are explained as well by {listed(others)}, in another way")
@@ -223,6 +236,8 @@ def _titled_values(step: Step) -> str:
     if step.refitted:
         changed = _refitted_values(step, with_errors=True)
         return f"{effect_name(step.effects[0])}: {changed} in the profile"
+    if needs_calibration(step):
+        return step_title(step)
     values = {e: values_text(step.parameters.get(e, {})) for e in kinds_of(step)}
     if has_other_law(step) or len(values) == 1:
         return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)

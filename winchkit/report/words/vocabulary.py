@@ -106,6 +106,12 @@ def effect_name(effect: str) -> str:
     return f"{words} (line {line})" if line else words
 
 
+def name_and_id(effect: str) -> str:
+    """Name of an effect with its id for commands, such as ``gear ratio (gear-ratio)``."""
+    name = effect_name(effect)
+    return effect if name == effect else f"{name} ({effect})"
+
+
 def estimate_text(parameter: str, estimate: Estimate) -> str:
     """A parameter with its value: ``EA = 247.4 ± 6.1 kN``."""
     unit = parameter_unit(parameter, estimate.unit)

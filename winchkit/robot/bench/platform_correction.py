@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,6 +40,22 @@ _NO_FORCES = (
     "change the limits"
 )
 Preload = float | Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class HeldValues:
+    """Set-point and measured values of what a platform holds; None for what is not held."""
+
+    force: Mapping[str, float | None] | None = None
+    """Set-point by cable, N."""
+    measured: Mapping[str, float | None] | None = None
+    """Reading by cable, N; None without one."""
+    missing: Mapping[str, float | None] | None = None
+    """By cable, N: of the forces that balance each other."""
+    position_error: float | None = None
+    """Mean of the tracker's newest 50 poses, m."""
+    rotation_error: float | None = None
+    """As ``position_error``, rad."""
 
 
 class HeldPlatform(PlatformPose):
@@ -254,35 +271,34 @@ class HeldPlatform(PlatformPose):
         check = self.corrections.check(here, force[None], angles, own.stiffness, known=own.known)
         loop.aim(force, check)
 
-    def held(self) -> dict[str, Any]:
+    def held(self) -> HeldValues:
         """What is held, or was held last, and how far the platform is from it.
 
         Raises MotionError where nothing was held.
-
-        Returns
-        -------
-        dict
-            By cable ``force`` (set-point) and ``measured``, N, and ``missing``, of the forces that
-            balance each other, N; ``position_error``, m, and ``rotation_error``, rad, mean of the
-            tracker's newest 50 poses. None for what is not held, or not measured.
         """
         if not self._held:
             raise MotionError("nothing was held; begin with hold")
-        out: dict[str, Any] = dict.fromkeys(
-            ("force", "measured", "missing", "position_error", "rotation_error")
-        )
+        out = HeldValues()
         for loop in self._held:
             if isinstance(loop, PoseLoop):
                 error = loop.mean_error
-                out["position_error"] = finite_or_none(float(np.linalg.norm(error[:3])))
-                out["rotation_error"] = finite_or_none(float(np.linalg.norm(error[3:])))
+                out = replace(
+                    out,
+                    position_error=finite_or_none(float(np.linalg.norm(error[:3]))),
+                    rotation_error=finite_or_none(float(np.linalg.norm(error[3:]))),
+                )
             else:
                 measured = self.corrections.readings(self._bench.clock.now())
-                found = {"force": loop.force, "measured": measured, "missing": loop.mean_error}
-                for name, values in found.items():
-                    shown = map(finite_or_none, values.tolist())
-                    out[name] = dict(zip(self.robot.names, shown, strict=True))
+                out = replace(
+                    out,
+                    force=self._by_cable(loop.force),
+                    measured=self._by_cable(measured),
+                    missing=self._by_cable(loop.mean_error),
+                )
         return out
+
+    def _by_cable(self, values: Array) -> dict[str, float | None]:
+        return dict(zip(self.robot.names, map(finite_or_none, values.tolist()), strict=True))
 
     def _hold_for(self, duration: float, hold: float) -> None:
         """Refresh what was just started for a duration (s); returns at rest."""

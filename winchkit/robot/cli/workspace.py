@@ -91,11 +91,13 @@ def command(
     --speed and --rotation-speed. clear: cables keep the clearance of the bench file. A position
     counts where all rotations of --turn do; without it the rotation is that of home.
     """
+    from winchkit.cli.core.early_checks import check_output
     from winchkit.cli.core.quantities import optional, quantity
     from winchkit.regular_file import refuse_existing
     from winchkit.robot.workspace.workspace import grid_of, workspace_of
 
     if output:
+        check_output(output, (".ply", ".obj", ".csv"))
         refuse_existing(Path(output), replace)
     given: dict[str, Any] = {
         "force": optional(force, "force"),

@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import ClassVar
+
+import numpy as np
 
 from winchkit.arguments import ProgressCallback, no_progress
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.regression.cross_validation import AT_NOISE
+from winchkit.diagnosis.regression.cross_validation import AT_NOISE, excess
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import held
 from winchkit.diagnosis.regression.intervals import estimates
@@ -66,6 +69,7 @@ from winchkit.robot.diagnosis.errors import (
     refuted_outputs,
     rms,
 )
+from winchkit.robot.diagnosis.home import with_home_doubt
 from winchkit.robot.diagnosis.pose_design import next_pose_runs
 from winchkit.robot.diagnosis.preparation import (
     Preparation,
@@ -210,6 +214,22 @@ class RobotSelection:
         """The model with all named effects."""
         return FittedModel(self.engine.regression, self.result.final, self.result.noise)
 
+    def explained(self, steps: Sequence[int]) -> list[float]:
+        """Share of the excess that each of these terms explains beside those before it and what is
+        always fitted: where a frame and a reflector far off explain the same, neither explains much
+        beside the other."""
+        noise = {name: output.noise_rms for name, output in self.in_noise.items()}
+        before = {name: output.heldout_rms_before for name, output in self.in_noise.items()}
+        part, whole = self.final.fit.hypothesis, excess(before, noise)
+        if not whole > 0.0:
+            return [float("nan")] * len(steps)
+        models = [self.final]
+        for index in reversed(steps):
+            part = part.without(index)
+            models.append(replace(self.final, fit=self.engine.refit(part, self.result.noise)))
+        left = [excess(errors_in_noise(model), noise) for model in reversed(models)]
+        return [float(np.clip((b - a) / whole, 0.0, 1.0)) for b, a in pairwise(left)]
+
     @property
     def errors(self) -> tuple[Errors, Errors]:
         """Errors of both models at every pose, SI."""
@@ -236,11 +256,13 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     final, sets = with_first_members(engine, final, noise, sets)
     selection = replace(selection, result=replace(selection.result, final=final))
     result, outputs, verdict = selection.result, selection.outputs, selection.verdict
+    in_turn = (*preparation.found, *added)
+    explained = dict(zip(in_turn, selection.explained(in_turn), strict=True))
     steps = (
         *selection.refitted,
-        *_registered_steps(selection),
+        *_registered_steps(selection, explained),
         *_geometry_steps(selection),
-        *_steps(selection, sets),
+        *_steps(selection, sets, explained),
     )
     repeat = [NextRun((), _REPEAT)] if verdict == "undecided" else []
     diagnosis = RobotDiagnosis(
@@ -272,22 +294,24 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     return RobotAnswer(selection, sets, diagnosis)
 
 
-def _steps(selection: RobotSelection, sets: Sequence[EquivalenceSet]) -> Iterator[Step]:
+def _steps(
+    selection: RobotSelection, sets: Sequence[EquivalenceSet], explained: Mapping[int, float]
+) -> Iterator[Step]:
     """Every addition with its share and doubts."""
     engine, result = selection.engine, selection.result
     steps = steps_of(engine, result, sets) if sets else ()
     for index, step in enumerate(map(plain_step, steps), start=engine.n_initial_terms):
-        yield _with_standing(selection, step, index)
+        yield _with_standing(selection, replace(step, explains=explained[index]), index)
 
 
 def _with_standing(selection: RobotSelection, step: Step, index: int) -> Step:
     """A step with its share and doubts; no free curve is compared with its law."""
     engine, result = selection.engine, selection.result
     final, noise = result.final, result.noise
-    without = engine.refit(final.hypothesis.without(index), noise)
-    acts = final.hypothesis.terms[index].effect.outputs
-    standing = _standing(selection, replace(selection.final, fit=without), acts)
-    return with_standing(engine, result, step, index=index, standing=standing)
+    without = replace(selection.final, fit=engine.refit(final.hypothesis.without(index), noise))
+    standing = _standing(selection, without, final.hypothesis.terms[index].effect.outputs)
+    step = with_standing(engine, result, step, index=index, standing=standing)
+    return with_home_doubt(engine, selection.final, without, step, index)
 
 
 def _standing(selection: RobotSelection, without: FittedModel, acts: Sequence[str]) -> Standing:
@@ -305,7 +329,7 @@ def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
     return pose_traces(names, UNITS, *((after, before) if named else (before,)))
 
 
-def _registered_steps(selection: RobotSelection) -> Iterator[Step]:
+def _registered_steps(selection: RobotSelection, explained: Mapping[int, float]) -> Iterator[Step]:
     """Effects of the tracker that were registered before the selection, as additions."""
     final, found = selection.final, selection.preparation.found
     own = estimates(final.regression, final.fit, final.spread)
@@ -313,7 +337,13 @@ def _registered_steps(selection: RobotSelection) -> Iterator[Step]:
     for index in found:
         term, values = own[index]
         place = tuple(Place(*at) for at in term.effect.place)
-        step = Step((term.effect.id,), {term.effect.id: values}, gain, place=place)
+        step = Step(
+            (term.effect.id,),
+            {term.effect.id: values},
+            gain,
+            place=place,
+            explains=explained[index],
+        )
         yield _with_standing(selection, step, index)
 
 

@@ -15,8 +15,8 @@ from winchkit.diagnosis.results import OutputError, OutputFit
 from winchkit.profile_edit.naming import extended_name
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import AxisLabel, reading
+from winchkit.report.figures.error_ratios import error_ratios, present
 from winchkit.report.figures.figure import Figure, FigureAxis, FigureSeries, Panel
-from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.html.markup import Markup, element, table
 from winchkit.report.html.page import figure_block, page
@@ -72,9 +72,9 @@ class _PoseReport:
         }
 
     @cached_property
-    def ladder(self) -> Figure | None:
+    def ratios(self) -> Figure | None:
         """Errors over the noise; None where no noise is known."""
-        return error_ladder(
+        return error_ratios(
             self.outputs,
             extended=self.after is not None,
             changed=self.changed,
@@ -83,8 +83,8 @@ class _PoseReport:
 
     @property
     def figures(self) -> list[Figure]:
-        """The ladder, where there is one, then the errors."""
-        return [*present(self.ladder), *self.drawn.values()]
+        """The figure of the ratios, where there is one, then the errors."""
+        return [*present(self.ratios), *self.drawn.values()]
 
     def cards(self) -> list[Markup]:
         """A card per output: its figure, and its error by line or axis."""
@@ -238,7 +238,7 @@ def report_html(
         command,
         title=title,
         unexplained=patterns,
-        ladder=shown.ladder,
+        ratios=shown.ratios,
     )
     return page(title, [*shown.figures, *patterns], content, headed=False)
 
@@ -265,7 +265,7 @@ def comparison_html(
         shown.cards(),
         command,
         title=title,
-        ladder=shown.ladder,
+        ratios=shown.ratios,
     )
     return page(title, shown.figures, content, headed=False)
 
@@ -293,7 +293,7 @@ def addition_html(
     shown = _of_addition(fitted, command.source)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
     content = addition_sections(
-        fitted.addition, shown.cards(), command, better, title=title, ladder=shown.ladder
+        fitted.addition, shown.cards(), command, better, title=title, ratios=shown.ratios
     )
     return page(title, shown.figures, content, headed=False)
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -233,7 +234,7 @@ def grid_of(
             f"no cell of {step:.4g} m fits along {axis}, where the box has {edge:.4g} "
             "m; give a smaller step or a larger box"
         )
-    if (poses := int(np.prod(counts)) * len(axes)) > _MOST:
+    if (poses := prod(counts) * len(axes)) > _MOST:
         raise UsageError(
             f"{poses} poses of steps of {step:.4g} m are more than {_MOST}; take a "
             "larger step or a smaller box"

@@ -37,14 +37,20 @@ _CELL_ALONE = (
     "diagnose --run`; import the file together with the one that has the angle, or name it by "
     '--column "motor_angle=COLUMN [deg]", for a run of a winch'
 )
+
+
+def _as_unit(channel: str, unit: str) -> str:
+    return f'; --column "{channel}=COLUMN [{unit}]" where one is'
+
+
 _CONSTANTS = {
-    "rated_torque": "a share of the rated torque",
-    "torque_constant": "A",
-    "counts_per_turn": "counts",
-    "sensitivity": "mV/V",
-    "capacity": "mV/V",
+    "rated_torque": ("a share of the rated torque", _as_unit("motor_torque", "%")),
+    "torque_constant": ("A", _as_unit("motor_torque", "A")),
+    "counts_per_turn": ("counts", _as_unit("motor_angle", "counts")),
+    "sensitivity": ("mV/V", _as_unit("tension", "mV/V")),
+    "capacity": ("mV/V", _as_unit("tension", "mV/V")),
 }
-"""Constants of answers, with the unit that needs them."""
+"""Constants of answers, with the unit that needs them and the option that gives it to a column."""
 _ANGLES, _VELOCITIES = {"motor_angle", "position"}, {"motor_velocity", "velocity"}
 
 
@@ -187,7 +193,7 @@ def _without_use(
     guesses: Sequence[Guess], tables: Sequence[ColumnTable], answers: Answers
 ) -> Iterator[str]:
     """Notes on constants that change nothing: the columns have units of their own."""
-    for name, unit in _CONSTANTS.items():
+    for name, (unit, remedy) in _CONSTANTS.items():
         if getattr(answers, name) is None:
             continue
         nothing: dict[str, Any] = {name: None}
@@ -199,7 +205,7 @@ def _without_use(
             (one.used, one.questions, one.notes) == (other.used, other.questions, other.notes)
             for one, other in zip(guesses, others, strict=True)
         ):
-            yield f"--{name.replace('_', '-')} is not used: no column is in {unit}"
+            yield f"--{name.replace('_', '-')} is not used: no column is in {unit}{remedy}"
 
 
 def _with_one_motion(

@@ -255,7 +255,7 @@ function build() {
       el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("div", { class: "upright" }, el("button", { id: "tare", onclick: tare }, "Tare… ", el("kbd", {}, "T")), el("button", { id: "untare", hidden: true, onclick: () => send("undo_tare", { winch }) }, "Undo tare"))),
       el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused()) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
   fill(document.getElementById("stopbar"), jogButton(1), jogButton(-1), stopButton());
-  if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
+  if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile, taller: beside(Object.keys(declared.winch).length) });
   if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared, picture && picture.status.tare && picture.status.tare[winch]);
   if (tab === "Bus frames") frames(document.getElementById("frames"));
   if (tab === "Drive objects") objects(document.getElementById("objects"), winch);
@@ -433,6 +433,9 @@ function charts(at) {
 }
 
 // Every winch of the bench as a card.
+// Rows of cards beyond two make the left column longer than four plots: px for each of them.
+function beside(winches) { return matchMedia("(min-width: 1200px)").matches ? Math.max(0, Math.ceil(winches / 2) - 2) * 20 : 0; }
+
 function cards() {
   const box = document.getElementById("cards");
   if (box) renew(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));

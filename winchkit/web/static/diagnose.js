@@ -1,15 +1,15 @@
-// The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
+// The Diagnose view: verdict, errors of each model, candidate card, curves over time, residual over variables.
 import { ask, attempt, closeDialog, dialog, download, drawAnswer, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
 import { channelPanel } from "./channels.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
-import { counted, ladderExporter, ladderGrid, place, presentName, reach } from "./ladder.js";
+import { counted, modelExporter, modelGrid, place, presentName, reach } from "./model_errors.js";
 import { morph, slideRails } from "./motion.js";
 import { newProfile } from "./profile.js";
 import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
-// The output that the ladder proposes has the focus until another is chosen, and after an addition.
+// The output that the errors propose has the focus until another is chosen, and after an addition.
 let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, over = [], earlier = null, drawnCurve = null, wanted = null;
 
 export function enter(main, state) { root = main; shown = wanted || { effect: null, output: null, chosen: false }; wanted = null; brushed = null; waiting = []; update(state); }
@@ -42,22 +42,22 @@ function render() {
   fill(root, context(), el("div", { id: "busy" }));
   if (!view.runs.length) root.append(empty());
   else if (d && view.beside) {
-    if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
+    if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.models.focus) ? d.models.focus : both(view)[0];
     drawSides(root, view, shown.output, focusOfSides);
   } else if (d) {
-    const stays = shown.chosen || earlier, focus = stays && d.ladder.columns.some((c) => c.output === shown.output) ? shown.output : d.ladder.focus;
+    const stays = shown.chosen || earlier, focus = stays && d.models.columns.some((c) => c.output === shown.output) ? shown.output : d.models.focus;
     shown.output = focus;
-    const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
+    const candidates = d.models.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
-    // Steps and cards have a column of their own: ladder and residual are seen at a height of 900 px, whatever the number of steps.
+    // Steps and cards have a column of their own: errors and residual are seen at a height of 900 px, whatever the number of steps.
     const open = d.patterns.length > 0, panel = (id, label, more = "") => el("section", { class: `panel ${more}`, id, "aria-label": label });
     const side = [d.steps.length && el("section", { class: "panel found", "aria-label": "Effects that were found" }, stepList(d.steps)), shown.effect && panel("card", "Candidate", "card"), open && panel("next", "What to do next", "card next")].filter(Boolean);
     root.append(head(d), el("div", { class: "grid" },
-      el("div", { class: `stacked ${side.length ? "w8" : "w12"}` }, panel("ladder", "Held-out error of each candidate"), open ? panel("pattern", "The curve to explain") : null, panel("time", "Measured and predicted")),
+      el("div", { class: `stacked ${side.length ? "w8" : "w12"}` }, panel("models", "Held-out error of each candidate"), open ? panel("pattern", "The curve to explain") : null, panel("time", "Measured and predicted")),
       side.length ? el("div", { class: "stacked w4" }, side) : null,
       panel("over", "Residual against each variable", "w12"), panel("data", null, "w12")), channelPanel(view));
-    drawLadder(); drawTime(); drawMultiples(); drawData();
-    if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
+    drawModels(); drawTime(); drawMultiples(); drawData();
+    if (earlier) slideRails(root.querySelector("#models"), earlierRails());
     if (shown.effect) drawCard();
     if (open) drawPattern();
   } else if (view.outputs.length) {
@@ -177,7 +177,7 @@ function stepList(steps) {
   return el("ol", {}, steps.map((step) => el("li", {}, step.text, step.doubts.length ? el("ul", {}, step.doubts.map((text) => el("li", {}, text))) : null)));
 }
 
-// The errors before and after in the colours of the ladder, and no line break before a unit.
+// The errors before and after in the colours of the models, and no line break before a unit.
 function coloured(sentence) {
   const joined = sentence.replace(/(\d) (?=[^\W\d_µ%°]|[µ%°])/g, "$1\u00a0").replace(/\u00a0(mN|N|kN) m\b/g, "\u00a0$1\u00a0m");
   return joined.split(/(from [^ ]+ to [^ ]+)(?= \()/).map((part, i) => {
@@ -188,21 +188,21 @@ function coloured(sentence) {
 
 // Places of the earlier profile's errors on the present axis, in percent.
 function earlierRails() {
-  const { columns, rows } = earlier.diagnosis.ladder, today = rows.find((row) => row.kind === "today"), most = reach(view.diagnosis.ladder);
+  const { columns, rows } = earlier.diagnosis.models, today = rows.find((row) => row.kind === "today"), most = reach(view.diagnosis.models);
   return Object.fromEntries(columns.flatMap(({ output }) => today.cells[output] && today.cells[output].ratio ? [[output, place(today.cells[output].ratio, most)]] : []));
 }
 
-function drawLadder() {
-  const box = root.querySelector("#ladder"), own = view.diagnosis.ladder, narrow = matchMedia("(max-width: 699px)").matches;
-  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), ladderExporter(own, { output: shown.output, effect: shown.effect, present: presentName(view.profile) }, source)),
+function drawModels() {
+  const box = root.querySelector("#models"), own = view.diagnosis.models, narrow = matchMedia("(max-width: 699px)").matches;
+  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), modelExporter(own, { output: shown.output, effect: shown.effect, present: presentName(view.profile) }, source)),
     narrow ? el("div", { class: "row segments" }, own.columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null,
-    ladderGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
+    modelGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
 }
 
 function focusOfSides(output) { shown.output = output; shown.chosen = true; address(); render(); }
-matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#ladder")) drawLadder(); });
-function focus(output) { shown.output = output; shown.chosen = true; span = null; over = []; brushed = null; waiting = []; address(); drawLadder(); drawTime(); drawMultiples(); }
-function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
+matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#models")) drawModels(); });
+function focus(output) { shown.output = output; shown.chosen = true; span = null; over = []; brushed = null; waiting = []; address(); drawModels(); drawTime(); drawMultiples(); }
+function choose(effect) { shown.effect = effect; address(); drawModels(); drawCard(); }
 // The address: output, candidate, the seconds that are shown, and the profile beside.
 function address() {
   const beside = view.beside ? besideOf(view) : "", part = span ? span.map((value) => Number(value.toFixed(4))).join("to") : "";
@@ -359,7 +359,7 @@ async function drawMultiples() {
 }
 
 function multiplesFigure(found) {
-  const name = view.diagnosis.ladder.columns.find((c) => c.output === shown.output).name, range = sym(found.residual)(), marked = brushed && found.residual.map((value, i) => (brushed.marked.has(i) ? value : null));
+  const name = view.diagnosis.models.columns.find((c) => c.output === shown.output).name, range = sym(found.residual)(), marked = brushed && found.residual.map((value, i) => (brushed.marked.has(i) ? value : null));
   return { title: `Residual of the ${name.toLowerCase()} [${found.unit}] against each variable`, source: source(), across: 3, legend: [{ name: "residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
     panels: found.panels.map((panel) => ({ title: `${panel.name}, ${Math.round(100 * panel.share)} %`, x: panel.x, xLabel: panel.label, noise: found.noise, range, logarithmic: panel.logarithmic,
       series: [{ name: `residual [${found.unit}]`, y: found.residual, tone: "today", points: true, opacity: 0.28 }, { name: `mean [${found.unit}]`, x: panel.bins, y: panel.means, tone: "today", width: 2, broken: true }, ...(marked ? [{ name: `marked [${found.unit}]`, y: marked, tone: "brush", points: true }] : [])] })) };
@@ -408,7 +408,7 @@ function drawData() {
 
 export function keys(event) {
   if (!view || !view.diagnosis) return false;
-  const rows = view.diagnosis.ladder.rows.filter((row) => row.kind === "candidate"), at = rows.findIndex((row) => row.effect === shown.effect);
+  const rows = view.diagnosis.models.rows.filter((row) => row.kind === "candidate"), at = rows.findIndex((row) => row.effect === shown.effect);
   if (event.key === "j" && rows[at + 1]) choose(rows[at + 1].effect);
   else if (event.key === "k" && at > 0) choose(rows[at - 1].effect);
   else if (event.key === "a" && shown.effect && !view.busy) add(shown.effect);

@@ -1,7 +1,7 @@
-// Two profiles, or two sets of runs, side by side: errors, ladders and residuals on the same axes.
+// Two profiles, or two sets of runs, side by side: errors of each model and residuals on the same axes.
 import { ask, drawAnswer, el, icon, number, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
-import { ladderGrid, presentName, reach } from "./ladder.js";
+import { modelGrid, presentName, reach } from "./model_errors.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
 let span = null;
@@ -24,23 +24,23 @@ const source = (side) => sourceOf(`profile ${profileOf(side)}`, usedOf(side).map
 
 export function drawSides(root, view, output, focus) {
   span = null;
-  const most = Math.max(...sidesOf(view).map((side) => reach(side.diagnosis.ladder)));
+  const most = Math.max(...sidesOf(view).map((side) => reach(side.diagnosis.models)));
   const panels = (id, label) => sidesOf(view).map((side, i) => el("section", { class: "panel w6", id: `${id}-${"ab"[i]}`, "aria-label": `${label}, ${"AB"[i]}` }));
-  const ladders = panels("ladder", "Held-out error of each candidate"), times = panels("time", "Residual over time"), over = panels("over", "Residual against each variable");
+  const models = panels("models", "Held-out error of each candidate"), times = panels("time", "Residual over time"), over = panels("over", "Residual against each variable");
   sidesOf(view).forEach((side, i) => {
     const d = side.diagnosis;
-    ladders[i].append(el("header", {}, el("h2", {}, `${"AB"[i]}  ${profileOf(side)}`), el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip)),
+    models[i].append(el("header", {}, el("h2", {}, `${"AB"[i]}  ${profileOf(side)}`), el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip)),
       el("p", { class: "note" }, runsText(side, view)), el("p", { class: "said" }, d.headline),
-      ladderGrid(d.ladder, { output, only: true, most, present: presentName(side.profile), focus }));
+      modelGrid(d.models, { output, only: true, most, present: presentName(side.profile), focus }));
   });
   root.append(el("div", { class: "verdict" }, el("h1", {}, headline(view, output))),
-    el("div", { class: "grid" }, el("section", { class: "panel w12", "aria-label": "Errors of both sides" }, errors(view, output, focus)), ladders, times, over));
+    el("div", { class: "grid" }, el("section", { class: "panel w12", "aria-label": "Errors of both sides" }, errors(view, output, focus)), models, times, over));
   drawTimes(view, output, times);
   drawOver(view, output, over);
 }
 
-const todayOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === "today").cells;
-const floorOf = (side) => side.diagnosis.ladder.rows.find((row) => row.kind === "floor").cells;
+const todayOf = (side) => side.diagnosis.models.rows.find((row) => row.kind === "today").cells;
+const floorOf = (side) => side.diagnosis.models.rows.find((row) => row.kind === "floor").cells;
 const text = (cell) => (cell ? cell.text : "–");
 
 // Colours of both sides: that of the better model for the smaller error above its noise floor.
@@ -50,14 +50,14 @@ function tones(view, output) {
 }
 
 function headline(view, output) {
-  const { name, unit } = view.diagnosis.ladder.columns.find((c) => c.output === output), [a, b] = sidesOf(view).map((side) => text(todayOf(side)[output]));
+  const { name, unit } = view.diagnosis.models.columns.find((c) => c.output === output), [a, b] = sidesOf(view).map((side) => text(todayOf(side)[output]));
   const [first, second] = tones(view, output).map((tone) => (tone === "with" ? "after" : "before"));
   return [`${name} error `, el("b", { class: first }, `${a} ${unit}`), " with A, ", el("b", { class: second }, `${b} ${unit}`), " with B"];
 }
 
 function errors(view, output, focus) {
   const ratio = (cell) => (cell && cell.ratio ? `${cell.ratio < 100 ? cell.ratio.toPrecision(3) : number(cell.ratio, 3)}×` : "–");
-  const shared = view.diagnosis.ladder.columns.filter((c) => both(view).includes(c.output));
+  const shared = view.diagnosis.models.columns.filter((c) => both(view).includes(c.output));
   const rows = shared.map((c) => el("tr", {}, el("td", {}, el("button", { class: "plain", "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", { class: "note" }, c.unit))),
     sidesOf(view).flatMap((side) => [el("td", { class: "number" }, text(todayOf(side)[c.output])), el("td", { class: "number wide" }, text(floorOf(side)[c.output])), el("td", { class: "number" }, ratio(todayOf(side)[c.output]))])));
   return el("div", { class: "scroll" }, el("table", { class: "sides" }, el("thead", {}, el("tr", {}, ["Held-out error", "A", "noise floor A", "A ÷ floor", "B", "noise floor B", "B ÷ floor"].map((words, i) => el("th", { class: `${i ? "number" : ""} ${i % 3 === 2 ? "wide" : ""}` }, words)))), el("tbody", {}, rows)));

@@ -38,8 +38,8 @@ let chosen = DEFAULT.map((names) => [...names]), span = [...WHOLE], drawn = [], 
 export const isPaused = () => paused;
 export function pause(button) { paused = !paused; if (!paused) kept = null; button.firstChild.textContent = paused ? "Go on " : "Pause "; }
 
-// `read` gives the rows of the history and the predictions, now; `declared` names the winch.
-export function strips(box, read, { winch, limits, bench, profile }) {
+// `read` gives the rows of the history and the predictions, now; each plot is `taller` by px.
+export function strips(box, read, { winch, limits, bench, profile, taller }) {
   drawn = []; kept = null;
   fill(box, chosen.map((names, index) => strip(names, index)));
   fill(box.parentElement.querySelector(".more"), el("select", { "aria-label": "Add a chart", onchange: (event) => { if (event.target.value) { chosen.push([event.target.value]); again(); } } }, el("option", { value: "" }, "Add a chart…"), Object.keys(CHANNELS).map((name) => el("option", {}, name))),
@@ -47,7 +47,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
   const hosts = [...box.querySelectorAll(".plot")];
   chosen.forEach((names, i) => draw(names, hosts[i], box.querySelectorAll(".last")[i], i === chosen.length - 1));
 
-  function again() { strips(box, read, { winch, limits, bench, profile }); refresh(); }
+  function again() { strips(box, read, { winch, limits, bench, profile, taller }); refresh(); }
 
   function strip(names, index) {
     const unit = CHANNELS[names[0]].unit, more = Object.keys(CHANNELS).filter((name) => CHANNELS[name].unit === unit && !names.includes(name));
@@ -64,7 +64,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       if (residual) columns.push(now.rows.map(() => noise), now.rows.map(() => (noise === null ? null : -noise)));
       return [now.rows.map((row) => row.time - end), ...columns];
     };
-    const own = plot(host, data(), series, { height: axis ? 96 : 72, left: LEFT, names, unit: CHANNELS[names[0]].unit.split(",")[0], sync: "strips", label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
+    const own = plot(host, data(), series, { height: (axis ? 96 : 72) + taller, left: LEFT, names, unit: CHANNELS[names[0]].unit.split(",")[0], sync: "strips", label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
     const lines = ({ gross, tension } = {}) => names[0] === "tension" ? limits.tension.map((v) => v === null ? null : v - ((gross ?? tension) - tension)) : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
     const beyond = last.parentElement.querySelector(".beyond");
     drawn.push(() => {

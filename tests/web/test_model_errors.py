@@ -1,4 +1,4 @@
-"""The ladder and the sentence of one diagnosis have the same errors, digit by digit."""
+"""The figure and the sentence of one diagnosis have the same errors, digit by digit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import winchkit
 from report_answers import ELASTIC, OPEN, diagnosis_of
 from winchkit.report.words.sentence import sentence
 from winchkit.web.examples import example_runs
-from winchkit.web.ladder import ladder, verdict
+from winchkit.web.model_errors import model_errors, verdict
 
 
 @pytest.mark.slow
@@ -20,7 +20,7 @@ def test_the_named_candidate_has_the_errors_of_the_sentence() -> None:
     answer = winchkit.diagnose(list(example.runs), profile)
     said = sentence(answer.diagnosis)
     assert len(answer.diagnosis.steps) == 1
-    found = ladder(answer, ())
+    found = model_errors(answer, ())
     units = {column["output"]: column["unit"] for column in found["columns"]}
     rows = {row["kind"]: row["cells"] for row in reversed(found["rows"])}
     compared = 0

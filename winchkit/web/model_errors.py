@@ -1,4 +1,4 @@
-"""The ladder and the candidate cards of the Diagnose view: error ÷ noise floor, by model."""
+"""Errors of the models, error ÷ noise floor, and candidate cards of the Diagnose view."""
 
 from __future__ import annotations
 
@@ -31,13 +31,18 @@ from winchkit.report.words.steps import (
     step_text,
     step_title,
 )
-from winchkit.report.words.vocabulary import VERDICT_NAMES, effect_name, output_name
+from winchkit.report.words.vocabulary import (
+    VERDICT_NAMES,
+    effect_name,
+    name_and_id,
+    output_name,
+)
 from winchkit.web.words import page_text
 
 _SHOWN = 8
-"""Candidates in the ladder; the others have less evidence."""
+"""Candidates that are shown; the others have less evidence."""
 _CHANGE = 0.01
-"""Change of an error that is shown as a number; below it the ladder has a dash."""
+"""Change of an error that is shown as a number; below it is a dash."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +108,10 @@ def refitted(said: str) -> dict[str, Any]:
     }
 
 
-def ladder(
+def model_errors(
     answer: WinchAnswer, history: Sequence[ModelErrors], beside: Diagnosis | None = None
 ) -> dict[str, Any]:
-    """Rows and columns of the ladder.
+    """Rows and columns of the errors of the models.
 
     ``beside``: another one, whose errors are given in the same units. Returns: ``columns`` with
     unit and noise floor; ``rows`` of kind ``history``, ``today``, ``candidate`` or ``floor``, each
@@ -122,7 +127,7 @@ def ladder(
     known = {c.effect: c for c in diagnosis.candidates if c.heldout_rms}
     first = [known[effect] for effect in named if effect in known]
     shown = (first + [c for c in scores if c not in first])[:_SHOWN]
-    errors_of = [today, *(rung.errors for rung in history)]
+    errors_of = [today, *(model.errors for model in history)]
     if beside is not None:
         errors_of.append({name: out.heldout_rms_before for name, out in beside.outputs.items()})
     scales = {
@@ -135,7 +140,7 @@ def ladder(
         cells = {name: _cell(errors.get(name), floors[name], scales[name]) for name in scales}
         return {"kind": kind, "label": label, "cells": cells, **more}
 
-    rows = [row("history", rung.label, rung.errors) for rung in history]
+    rows = [row("history", model.label, model.errors) for model in history]
     rows.append(row("today", "Present profile", today))
     # The errors of a candidate are those of its screening. Of the one effect that the sentence
     # names they are those of the sentence, of the final fit with its own weights.
@@ -203,7 +208,7 @@ def card(
             }
             for name, e in values.items()
         ],
-        "equal": list(distinct),
+        "equal": [name_and_id(effect) for effect in distinct],
         "told_apart": effect.told_apart,
         "next": None
         if not runs

@@ -29,14 +29,14 @@ class _ErrorRow:
     after: float
 
 
-def error_ladder(
+def error_ratios(
     outputs: Mapping[str, OutputError] | Mapping[str, OutputFit],
     *,
     extended: bool = False,
     changed: str = "with the effect",
     source: str = "",
 ) -> Figure | None:
-    """The ladder of one winch; the worst output first, None where no noise is known."""
+    """Error over the noise of one winch; the worst output first, None where no noise is known."""
     rows = [
         row
         for name in worst_outputs(outputs)
@@ -49,8 +49,8 @@ def error_ladder(
     return _figure("errors", title, rows, changed if extended else "", source)
 
 
-def fleet_ladders(found: Mapping[str, Comparison] | Mapping[str, Diagnosis]) -> list[Figure]:
-    """A ladder per output with a row per winch, the output with the largest ratio first."""
+def fleet_error_ratios(found: Mapping[str, Comparison] | Mapping[str, Diagnosis]) -> list[Figure]:
+    """A figure per output with a row per winch, the output with the largest ratio first."""
     out: list[tuple[float, Figure]] = []
     for output in dict.fromkeys(name for one in found.values() for name in one.outputs):
         rows = [
