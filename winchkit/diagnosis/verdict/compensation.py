@@ -105,7 +105,9 @@ def with_compensations(
                 doubted = _doubted(out[place], "curve", f"a curve over {words}", replaced)
                 out[place] = replace(doubted, curve=doubted.curve or words)
     torque = {k: p for p, k in at.items() if terms[k].effect.outputs == ("motor_torque",)}
-    refitted = {index for index, place in torque.items() if steps[place].refitted}
+    refitted = {
+        index for index, place in torque.items() if steps[place].refitted and not out[place].curve
+    }
     if refitted and (factor := _factor(engine, result, file, torque)) is not None:
         wrong = f"{100 * (factor.value - 1):+.1f} %".replace("-", "−")
         what = f"a torque constant that is wrong by {wrong}"
