@@ -53,9 +53,17 @@ def motion(fastest: float) -> tuple[Array, Array]:
 
 
 def runs(
-    coulomb: float, viscous: float, quadratic: float, *, factor: float = 1.0, lag: float = 0.0
+    coulomb: float,
+    viscous: float,
+    quadratic: float,
+    *,
+    factor: float = 1.0,
+    lag: float = 0.0,
+    late: float = 0.0,
 ) -> list[Run]:
-    """Two motions, each recorded twice; ``lag`` is that of a low-pass of the torque, s."""
+    """Two motions, each recorded twice; ``lag`` is that of a low-pass of the torque, s, by which it
+    may also be ``late`` without one.
+    """
     out = []
     for number, fastest in enumerate((130.0, 130.0, 80.0, 80.0)):
         time, speed = motion(fastest)
@@ -68,6 +76,7 @@ def runs(
         )
         kept = float(np.exp(-STEP / lag)) if lag else 0.0
         torque = np.asarray(lfilter([1 - kept], [1, -kept], torque))
+        torque = np.interp(time - late, time, torque)
         seen = factor * torque[::EVERY]
         noise = np.random.default_rng(number).normal(0.0, NOISE, len(seen))
         channels = {
@@ -112,6 +121,28 @@ def test_a_factor_on_the_torque_is_named_with_the_values_that_it_changes(
     assert float(text.partition("wrong by +")[2].partition("%")[0]) == pytest.approx(8.0, abs=0.5)
     assert not any(step.certain for step in moved)
     assert "A torque constant that is wrong by +" in headline(found)
+
+
+@pytest.mark.slow
+def test_a_factor_is_named_beside_a_value_that_does_not_follow_it(tmp_path: Path) -> None:
+    """Inertia and Coulomb friction have the same wrong ratio, viscous friction another one."""
+    found = diagnosed(tmp_path, runs(COULOMB, 1.3 * VISCOUS, 0.0, factor=1.05))
+    assert len(found.steps) > 1
+    assert all("factor" in {doubt.code for doubt in step.doubts} for step in found.steps)
+    assert not any(step.certain for step in found.steps)
+    assert "A torque constant that is wrong by +5." in headline(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("late", "lag", "name"), [(0.02, 0.0, "lead"), (0.0, 0.02, "lag")])
+def test_a_delay_and_a_low_pass_of_the_torque_have_names_of_their_own(
+    tmp_path: Path, late: float, lag: float, name: str
+) -> None:
+    found = diagnosed(tmp_path, runs(COULOMB, VISCOUS, 0.0, lag=lag, late=late))
+    (step,) = [step for step in found.steps if not step.refitted]
+    assert step.effects == (f"torque-{name}",)
+    ((_, size),) = step.parameters[step.effects[0]].items()
+    assert size.value == pytest.approx(lag - late, rel=0.05)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -97,28 +98,71 @@ def with_compensations(
         alike = [place for place in at if variable in over[place]]
         own = [p for p in alike if any(acts[p] & acts[q] for q in alike if q != p)]
         together = _Together.of(engine, result, file, [at[place] for place in own])
-        if together is not None and together.is_curve(variable):
+        if len(own) > 1 and together.is_curve(variable):
             words = variable.replace("_", " ")
             for place in own:
-                doubted = _doubted(out[place], "curve", f"a curve over {words}", len(own))
+                replaced = f"these {len(own)} effects"
+                doubted = _doubted(out[place], "curve", f"a curve over {words}", replaced)
                 out[place] = replace(doubted, curve=doubted.curve or words)
-    torque = [place for place in at if terms[at[place]].effect.outputs == ("motor_torque",)]
-    refitted = [place for place in torque if steps[place].refitted]
-    # An effect that the profile lacks, such as a lag, may also act beside a wrong factor.
-    for own in (torque, refitted) if refitted else ():
-        together = _Together.of(engine, result, file, [at[place] for place in own])
-        if together is not None and (factor := together.factor()) is not None:
-            wrong = f"{100 * (factor - 1):+.1f} %".replace("-", "−")
-            what = f"a torque constant that is wrong by {wrong}"
-            for place in own:
-                out[place] = _doubted(out[place], "factor", what, len(own))
-            break
+    torque = {k: p for p, k in at.items() if terms[k].effect.outputs == ("motor_torque",)}
+    refitted = {
+        index for index, place in torque.items() if steps[place].refitted and not out[place].curve
+    }
+    if refitted and (factor := _factor(engine, result, file, torque)) is not None:
+        wrong = f"{100 * (factor.value - 1):+.1f} %".replace("-", "−")
+        what = f"a torque constant that is wrong by {wrong}"
+        for term in torque.keys() & (refitted | factor.replaced):
+            place = torque[term]
+            replaced = ", ".join(ids[index] for index in sorted(factor.replaced))
+            out[place] = _doubted(out[place], "factor", what, replaced)
     if not any(step.curve for step in out):
         return tuple(out)
     weights = result.noise.inverse_sigma(engine.regression)
     index = [ids.index(step.effects[0]) for step in steps]
     changes = [weights * change_by(engine.regression, result.final, k) for k in index]
     return beside_unknown(out, [terms[k].effect.outputs for k in index], changes)
+
+
+@dataclass(frozen=True)
+class _Factor:
+    """A factor on what the profile predicts, and the terms whose changes it explains."""
+
+    value: float
+    replaced: frozenset[int]
+
+
+def _factor(
+    engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis, steps: Collection[int]
+) -> _Factor | None:
+    """The factor that explains as much with fewer parameters, in place of all ``steps`` and changed
+    values of the profile, or of these values but for as few as possible; of an axis only: by a
+    winch's load the torque constant is an effect like others.
+    """
+    if not isinstance(engine.regression.dataset.profile, AxisProfile):
+        return None
+    price, of_file = engine.penalty_per_parameter, frozenset(range(len(file.terms)))
+
+    def together(own: Collection[int]) -> _Together:
+        return _Together.of(engine, result, file, sorted(own))
+
+    alone = [together([index]) for index in of_file]
+    changed = frozenset(k for k, one in enumerate(alone) if one.gain > price * one.count)
+    # An effect that the profile lacks, such as a lag, may also act beside a wrong factor.
+    whole = together(of_file.union(steps))
+    replaced = changed.union(steps)
+    if whole.lost < price * (together(replaced).count - _FACTOR):
+        return _Factor(whole.factor, replaced)
+    own = of_file
+    while True:
+        # A value of its own beside the factor costs as much as one beside the file.
+        present = together(own)
+        saved = sum(alone[k].count for k in changed) - _FACTOR
+        saved -= sum(alone[k].count for k in of_file - own)
+        if saved <= 0:
+            return None
+        if present.lost < price * saved:
+            return _Factor(present.factor, own & changed)
+        own = min((own - {index} for index in own), key=lambda fewer: together(fewer).lost)
 
 
 def _is_of_reversals(step: Step) -> bool:
@@ -131,9 +175,9 @@ def _is_of_reversals(step: Step) -> bool:
     )
 
 
-def _doubted(step: Step, code: str, what: str, count: int) -> Step:
+def _doubted(step: Step, code: str, what: str, replaced: str) -> Step:
     text = (
-        f"{what} explains as much as these {count} effects together, beside the profile's own "
+        f"{what} explains as much as {replaced} together, beside the profile's own "
         "values and with fewer parameters: they may compensate each other"
     )
     if any(doubt.code == code for doubt in step.doubts):
@@ -189,10 +233,7 @@ class _Together:
         result: SelectionResult,
         file: Hypothesis,
         own: Sequence[int],
-    ) -> _Together | None:
-        """None for fewer than two terms."""
-        if len(own) < 2:
-            return None
+    ) -> _Together:
         final, hypothesis = result.final, result.final.hypothesis
         terms = hypothesis.terms
         for index in sorted(own, reverse=True):
@@ -225,21 +266,24 @@ class _Together:
             )
         )
 
-    def factor(self) -> float | None:
-        """A factor on what the profile predicts that explains as much, of an axis only: by a
-        winch's load the torque constant is an effect like others.
-        """
-        regression, price = self.engine.regression, self.engine.penalty_per_parameter
-        if not isinstance(regression.dataset.profile, AxisProfile):
-            return None
-        column = self.partial.projected(regression.change(self.without.hypothesis))
-        length = float(column @ column)
-        if not length > 0.0:
-            return None
-        along = float(column @ self.partial.residual)
-        explained = along**2 / length
-        lost = self.gain - explained
-        return 1 + along / length if lost < price * (self.count - _FACTOR) else None
+    @property
+    def factor(self) -> float:
+        """Factor on what the model without them predicts that explains most."""
+        along, length = self._along_prediction
+        return 1 + along / length if length > 0.0 else 1.0
+
+    @property
+    def lost(self) -> float:
+        """Increase of χ² by the factor in place of the terms."""
+        along, length = self._along_prediction
+        return self.gain - (along**2 / length if length > 0.0 else 0.0)
+
+    @cached_property
+    def _along_prediction(self) -> tuple[float, float]:
+        """Product of the residual and the prediction, and the square of the prediction."""
+        change = self.engine.regression.change(self.without.hypothesis)
+        column = self.partial.projected(change)
+        return float(column @ self.partial.residual), float(column @ column)
 
 
 def _of_file(term: Term, old: Term) -> Term:

@@ -30,6 +30,7 @@ from winchkit.diagnosis.regression.dispersion import (
 )
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import BandNoise
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import RivalPlace
@@ -122,7 +123,11 @@ def equivalence_set(
         s
         for s in scores
         if s.candidate.effect.id != own.effect.id
-        and s.explained_ss > own_explained_ss - max(_SCORE_MARGIN, 0.1 * own_explained_ss)
+        and (
+            s.explained_ss > own_explained_ss - max(_SCORE_MARGIN, 0.1 * own_explained_ss)
+            # The score of a delay is that of its usual size.
+            or (own.effect.is_delay and s.candidate.effect.is_delay)
+        )
     ][:_MOST_RIVALS]
     least = base.chi_square - _LEAST_SHARE * (base.chi_square - own_fit.chi_square)
     goal = own_fit.chi_square + largest_loss(np.inf)
@@ -143,7 +148,7 @@ def equivalence_set(
         residual = _where_explained(engine, fitted, own_fit, noise, own.effect.outputs)
         weighted = residual * dispersed.inverse_sigma(engine.regression)
         judged = replace(fitted, residual=residual, chi_square=float(weighted @ weighted))
-        worse = is_worse(judged)
+        worse = is_worse(judged) and not _within_a_sample(engine, own, rival.candidate.effect)
         fits_less = not worse and judged.chi_square < fitted.chi_square and is_worse(fitted)
         member = _Member(fitted.hypothesis.terms[-1], fitted, fitted, fits_less)
         # A wave of any order is also every law with a period: its order is a number more.
@@ -187,6 +192,20 @@ def equivalence_set(
     fits = tuple(member.fit for member in members)
     names = tuple(term.effect.id for term in terms)
     return EquivalenceSet(own, names, terms, fits, angles, further)
+
+
+def _within_a_sample(engine: SelectionEngine, own: Term, rival: Effect) -> bool:
+    """Whether two delays are shorter than the time between samples: what distinguishes a delay from
+    a low-pass is of second order in it, as is the error of an acceleration from samples.
+    """
+    regression = engine.regression
+    if not (
+        own.effect.is_delay and rival.is_delay and isinstance(regression, TimeSeriesRegression)
+    ):
+        return False
+    times = (abs(own.values[p.name]) for p in own.effect.parameters if p.role == "amplitude")
+    steps = np.concatenate([np.diff(motion.time) for motion in regression.motions])
+    return max(times) < float(np.median(steps))
 
 
 def _is_last_degenerate(engine: SelectionEngine, fitted: Fit, noise: BandNoise) -> bool:

@@ -137,13 +137,13 @@ TORQUE_LAG = Effect(
     formula="τ_f m' + m = τ",
     source="first-order filter, exact for a signal linear between samples",
     looks_like="A torque error in proportion to the rate of the torque.",
-    confused_with=("rotor-inertia", "motor-coulomb"),
+    confused_with=("torque-lead", "rotor-inertia", "motor-coulomb"),
     told_apart="Fast moves under two loads.",
 )
 
 
 def _torque_lead(torque: Array, at: At, values: Values) -> Array:
-    """Torque after the delay of the drive."""
+    """Torque after the delay of the drive, or before that of its signal."""
     return shifted(torque, at.time, values["lead"])
 
 
@@ -161,20 +161,22 @@ TORQUE_LEAD = Effect(
             "s",
             null=0.0,
             typical=5e-3,
-            low=0.0,
+            low=-2.0,
             high=2.0,
-            plausible=Plausible(0.0, 0.2, "a drive follows its command within a tenth of a second"),
+            plausible=Plausible(
+                -0.2, 0.2, "a drive, a bus and a logger delay by a tenth of a second"
+            ),
         ),
     ),
     apply=_torque_lead,
     undo=_torque_lead_undo,
     outputs=("motor_torque",),
-    what="The record has the commanded torque (0x6074), not the actual one (0x6077), which follows "
-    "with the delay of bus and control loop.",
+    what="The torque signal is early, as the commanded torque (0x6074), which the actual one "
+    "(0x6077) follows with the delay of bus and control loop; or late (negative), as behind a bus.",
     formula="m(t) = τ(t + δ)",
     source="definition of a delay; observed on EMPS (Janot et al. 2019), where the record is the "
     "command",
-    looks_like="A torque error in proportion to the rate of the torque, ahead of it.",
+    looks_like="A torque error in proportion to the rate of the torque.",
     confused_with=("torque-lag", "rotor-inertia"),
     told_apart="Fast moves under two loads, with the drive's actual and commanded torque.",
 )

@@ -171,14 +171,17 @@ EFFECTS: dict[str, tuple[str, str]] = {
         "saturation of the motor",
         "the torque constant of the motor falls with the current",
     ),
-    "torque-lag": ("delay of the torque signal", "the torque signal of the drive is delayed"),
+    "torque-lag": (
+        "low-pass of the torque signal",
+        "the torque signal of the drive is delayed by a low-pass",
+    ),
     "torque-ripple": (
         "ripple of the torque constant",
         "the torque constant depends on the rotor position",
     ),
     "torque-lead": (
-        "lead of the torque signal",
-        "the torque signal is the command, ahead of the torque",
+        "time shift of the torque signal",
+        "the torque signal is early (the command) or late by a fixed time",
     ),
     "viscous-thermal": (
         "temperature of the viscous friction",

@@ -121,8 +121,6 @@ def cause(steps: Sequence[Step], outputs: Mapping[str, OutputFit]) -> str:
     """What is missing, as the headline of a diagnosis with steps; without a full stop."""
     added = [step for step in steps if not step.refitted]
     refitted = [step for step in steps if step.refitted]
-    if len(steps) == 1:
-        return step_title(steps[0])
     count, parts = len(added) - len(named_only(steps, outputs)), []
     if added:
         first = step_title(added[0])
