@@ -17,7 +17,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.consistency import LATE
 from winchkit.runs.sanity.factors import Slope, named_factor
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.inspection import inspect_run
+from winchkit.runs.sanity.inspection import inspect_run, inspect_runs
 from winchkit.runs.sanity.local_noise import local_noise, sorted_quantile
 from winchkit.runs.sanity.outliers import _chance, outlier_mask
 from winchkit.runs.sanity.quantisation import _BINS, _PADDED, _SEARCHED, _cosine_sums, resolution
@@ -368,6 +368,17 @@ def test_a_slow_channel_of_coarse_resolution_is_not_held() -> None:
     time = np.arange(COUNT) / RATE
     values = np.round(40 * np.sin(2 * np.pi * time / 15))
     assert not found(run_of(values), "repeated-values")
+
+
+@given(SEEDS)
+def test_few_levels_have_the_resolution_that_another_run_shows(seed: int) -> None:
+    """A slow run of a coarse cell: no slower instrument, and no spike of a single step."""
+    random, time = np.random.default_rng(seed), np.arange(COUNT) / RATE
+    slow = 150 + 6 * np.sin(2 * np.pi * time / 20) + random.normal(0, 0.1, COUNT)
+    runs = [run_of(5 * np.round(values / 5)) for values in (tension(seed), slow)]
+    for inspected in inspect_runs(runs):
+        assert inspected.resolutions["tension"] == pytest.approx(5.0, rel=1e-3)
+        assert {finding.code for finding in inspected.findings} == {"quantised"}
 
 
 def test_a_constant_channel() -> None:

@@ -120,7 +120,8 @@ def command(
     elif output and not jsonl:
         for file, rows in log.files.items():
             click.echo(f"{file}: {rows} rows")
-        suggest_next("log", "info", next(iter(log.files), output))
+        if log.files:
+            suggest_next("log", "info", next(iter(log.files)))
     if log.terminated is not None:
         raise log.terminated
     if strict and log.silences.summary:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
     from winchkit.diagnosis.add import Addition
     from winchkit.diagnosis.diagnose import WinchAnswer
-    from winchkit.diagnosis.results import Comparison
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme, ProgrammeStep
     from winchkit.schema.simbench import SimBench
@@ -181,11 +180,8 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
     simulated time passes as fast as this computer allows. Exits with 0 when the hidden effect was
     found and the held-out error is at the noise floor, else with 1.
     """
-    from winchkit.catalog import find
-    from winchkit.diagnosis.compare import compare
     from winchkit.report.words.sentence import sentence
     from winchkit.runs import read_run
-    from winchkit.schema.read import read_profile
     from winchkit.sim import choose_bench
 
     started, out = time.monotonic(), output
@@ -196,7 +192,6 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
         paths = record(bench, seed, out / "runs", progress)
         progress("diagnosing", _RECORDING_SECONDS)
         runs = [read_run(path) for path in paths]
-        comparison = compare(runs, read_profile(find("profiles", profile_name)))
         findings = learn(runs, profile_name, out)
     truth = bench.answers
     right = findings.right(truth)
@@ -209,7 +204,7 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
         f"It recorded {len(runs)} runs, each motion twice under two loads: "
         f"{sum(len(run) for run in runs)} rows in {out / 'runs'}."
     )
-    _add_errors(story, comparison, findings)
+    _add_errors(story, findings)
     report = _write_report(out, story, findings, profile_name, hidden)
     seconds = time.monotonic() - started
     story.print(f"Report: {report}   ({seconds:.0f} s)")
@@ -240,12 +235,12 @@ class _Sentences:
         click.echo("\n".join(paragraph(text, then="  ")), err=self._quiet)
 
 
-def _add_errors(story: _Sentences, comparison: Comparison, findings: LoopResult) -> None:
+def _add_errors(story: _Sentences, findings: LoopResult) -> None:
     from winchkit.report.words.headline import size_texts
     from winchkit.report.words.sentence import capital
     from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-    for name, text in size_texts(comparison.outputs).items():
+    for name, text in size_texts(findings.answer.diagnosis.outputs).items():
         story.add(f"{capital(OUTPUT_NAMES[name])} error of the profile: {text}.")
     if findings.addition is not None:
         added = findings.addition.added[0].effect.id

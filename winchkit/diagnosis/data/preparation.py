@@ -45,7 +45,7 @@ from winchkit.quantity_text import quantity
 from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.inspection import inspect_run
+from winchkit.runs.sanity.inspection import inspect_runs
 from winchkit.runs.sanity.quantisation import quantisation_noise
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -102,7 +102,7 @@ def _prepared(
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
     has_cable = not isinstance(profile, AxisProfile)
-    inspected = [inspect_run(run, has_cable=has_cable) for run in runs]
+    inspected = inspect_runs(runs, has_cable=has_cable)
     sanity = findings(inspected, profile, catalogue)
     resolution = resolutions(inspected)
     runs, held = at_new_angles([usable(one) for one in inspected], sanity)

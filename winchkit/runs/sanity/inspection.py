@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.ground import ground_mask, load_on_ground
 from winchkit.runs.sanity.low_pass import low_pass
 from winchkit.runs.sanity.outliers import outlier_masks, outliers
-from winchkit.runs.sanity.quantisation import quantised, resolutions
+from winchkit.runs.sanity.quantisation import quantised, shared_resolutions
 from winchkit.runs.sanity.repeated_values import constant, repeated_values
 from winchkit.runs.sanity.sampling import sampling
 from winchkit.runs.sanity.saturation import SATURATED, at_limit, saturated
@@ -45,7 +45,19 @@ def inspect_run(run: Run, *, has_cable: bool = True) -> Inspection:
 
     ``has_cable``: whether a stated mass may hang on a cable; the weight of a joint does not.
     """
-    steps = resolutions(run)
+    (inspected,) = inspect_runs([run], has_cable=has_cable)
+    return inspected
+
+
+def inspect_runs(runs: Sequence[Run], *, has_cable: bool = True) -> list[Inspection]:
+    """Inspect runs of one winch: their instruments have one resolution, which slow runs of few
+    levels do not show.
+    """
+    steps = shared_resolutions(runs)
+    return [_inspected(*each, has_cable=has_cable) for each in zip(runs, steps, strict=True)]
+
+
+def _inspected(run: Run, steps: Mapping[str, float], *, has_cable: bool) -> Inspection:
     masks = outlier_masks(run, steps)
     out = list(sampling(run))
     for name in run:

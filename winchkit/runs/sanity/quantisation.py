@@ -14,7 +14,7 @@ Kendall, D. G. (1974). Hunting quanta. Phil. Trans. R. Soc. A 276, 231-266.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import sqrt
 
 import numpy as np
@@ -129,6 +129,22 @@ def resolutions(run: Run) -> dict[str, float]:
     }
 
 
+def shared_resolutions(runs: Sequence[Run]) -> list[dict[str, float]]:
+    """Resolutions of each run; of a channel that shows none, the largest of the other runs, if its
+    values are multiples of that.
+    """
+    found = [resolutions(run) for run in runs]
+    out = []
+    for run, own in zip(runs, found, strict=True):
+        known = dict(own)
+        for name in (name for name, step in own.items() if not step):
+            shared = max(each.get(name, 0.0) for each in found)
+            if shared and _steps_are_multiples(run[name], shared, least=1):
+                known[name] = shared
+        out.append(known)
+    return out
+
+
 def quantised(run: Run, name: str, step: float) -> Iterator[Finding]:
     """A channel whose resolution ``step`` is not small against its noise; value: the step."""
     channel = run.channels[name]
@@ -199,19 +215,19 @@ def _refined(sizes: Array, step: float) -> tuple[float, float]:
     return step, float(np.mean(np.cos(2 * np.pi * beyond / step)))
 
 
-def _steps_are_multiples(values: Array, step: float) -> bool:
-    """Whether also the first differences are multiples of a step that those of higher order are.
+def _steps_are_multiples(values: Array, step: float, least: int = _LEAST_DIFFERENCES) -> bool:
+    """Whether also the first differences are multiples of a step that those of higher order are, or
+    those of another run.
 
-    Those of a wave with few samples a period have few values, which may be so by chance.
+    Those of a wave with few samples a period have few values, which may be so by chance; ``least``
+    are needed.
     """
     steps = np.abs(np.diff(values))
     steps = steps[np.isfinite(steps) & (steps > step / 2)]
-    if len(steps) < _LEAST_DIFFERENCES:
+    if len(steps) < least:
         return False
     near = steps[steps < _NEAR * step]
-    return len(near) < _LEAST_DIFFERENCES or bool(
-        np.mean(np.cos(2 * np.pi * near / step)) >= _COHERENCE - _TIE
-    )
+    return len(near) < least or bool(np.mean(np.cos(2 * np.pi * near / step)) >= _COHERENCE - _TIE)
 
 
 def _is_dithered(values: Array) -> bool:
