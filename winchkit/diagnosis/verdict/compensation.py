@@ -97,8 +97,8 @@ def with_compensations(
     for variable in sorted(frozenset().union(*over.values())):
         alike = [place for place in at if variable in over[place]]
         own = [p for p in alike if any(acts[p] & acts[q] for q in alike if q != p)]
-        together = _Together.of(engine, result, file, [at[place] for place in own])
-        if len(own) > 1 and together.is_curve(variable):
+        index = [at[place] for place in own]
+        if len(own) > 1 and _Together.of(engine, result, file, index).is_curve(variable):
             words = variable.replace("_", " ")
             for place in own:
                 replaced = f"these {len(own)} effects"
