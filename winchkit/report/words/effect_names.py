@@ -181,7 +181,7 @@ EFFECTS: dict[str, tuple[str, str]] = {
     ),
     "torque-lead": (
         "time shift of the torque signal",
-        "the torque signal is early (the command) or late by a fixed time",
+        "the torque signal is shifted in time",
     ),
     "viscous-thermal": (
         "temperature of the viscous friction",
