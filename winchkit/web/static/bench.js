@@ -432,10 +432,10 @@ function charts(at) {
   strips.refresh();
 }
 
-// Every winch of the bench as a card.
 // Rows of cards beyond two make the left column longer than four plots: px for each of them.
 function beside(winches) { return matchMedia("(min-width: 1200px)").matches ? Math.max(0, Math.ceil(winches / 2) - 2) * 20 : 0; }
 
+// Every winch of the bench as a card.
 function cards() {
   const box = document.getElementById("cards");
   if (box) renew(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));
