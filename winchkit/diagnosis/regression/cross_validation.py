@@ -164,8 +164,8 @@ def _signed_rank_tail(differences: Array) -> float:
 
 def _shared(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
     """Derivatives by the unknowns of all runs, without offsets and states of single runs; zero by
-    those at a bound, which stay there whatever is held out; a curve has none. Its columns come
-    before the states.
+    those at a bound, which stay there whatever is held out. Columns of a curve, which has no
+    bounds, are between the unknowns of the effects and the states.
     """
     like, states = fit.hypothesis, sum(len(start) for start in fit.hypothesis.starts)
     shared = fit.jacobian[:, : fit.jacobian.shape[1] - states].copy()

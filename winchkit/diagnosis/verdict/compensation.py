@@ -152,17 +152,17 @@ def _factor(
     replaced = changed.union(steps)
     if whole.lost < price * (together(replaced).count - _FACTOR):
         return _Factor(whole.factor, replaced)
-    own = of_file
+    own, present = of_file, together(of_file)
     while True:
         # A value of its own beside the factor costs as much as one beside the file.
-        present = together(own)
         saved = sum(alone[k].count for k in changed) - _FACTOR
         saved -= sum(alone[k].count for k in of_file - own)
         if saved <= 0:
             return None
         if present.lost < price * saved:
             return _Factor(present.factor, own & changed)
-        own = min((own - {index} for index in own), key=lambda fewer: together(fewer).lost)
+        fewer = [own - {index} for index in own]
+        own, present = min(zip(fewer, map(together, fewer), strict=True), key=lambda x: x[1].lost)
 
 
 def _is_of_reversals(step: Step) -> bool:
