@@ -30,6 +30,49 @@ def test_time_advances_by_what_is_waited_for() -> None:
     assert clock.now() == start + 3600.0
 
 
+class LateSignal:
+    """A gate at which a signal is handled when it has opened, before its thread goes on."""
+
+    def __init__(self, gate: threading.Lock) -> None:
+        self._gate, self._raised = gate, False
+        self.release = gate.release
+
+    def acquire(self) -> bool:
+        self._gate.acquire()
+        if not self._raised:
+            self._raised = True
+            raise KeyboardInterrupt
+        return True
+
+
+def test_an_interrupt_at_the_turn_of_a_thread_does_not_lose_it() -> None:
+    """Ctrl-C twice in a demo was a hang, one time in ten: its turn was waited for once more."""
+
+    def interrupted() -> float:
+        clock = SimulatedClock()
+        start, original = clock.now(), clock._waiter
+        for_ever = clock.thread(lambda: clock.sleep(60.0), "other")
+        for_ever.start()
+
+        def late() -> object:
+            waiter = original()
+            waiter.gate = LateSignal(waiter.gate)  # type: ignore[assignment]
+            return waiter
+
+        clock._waiter = late  # type: ignore[assignment, method-assign]
+        with pytest.raises(KeyboardInterrupt):
+            clock.sleep(1.0)
+        clock._waiter = original  # type: ignore[method-assign]
+        clock.sleep(1.0)
+        return clock.now() - start
+
+    ended: list[float] = []
+    thread = threading.Thread(target=lambda: ended.append(interrupted()), daemon=True)
+    thread.start()
+    thread.join(10.0)
+    assert ended == [2.0], "it waits for ever"
+
+
 def test_threads_run_one_at_a_time_in_the_order_of_their_events() -> None:
     clock = SimulatedClock()
     start, seen, inside = clock.now(), [], threading.Lock()

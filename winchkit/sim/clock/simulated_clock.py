@@ -300,9 +300,11 @@ class SimulatedClock:
         try:
             waiter.gate.acquire()
         except BaseException:
-            # An interrupt: continue only at this thread's turn, since one thread runs at a time.
-            self.wake(waiter)
-            waiter.gate.acquire()
+            # An interrupt: continue only at this thread's turn, since one thread runs at a time. A
+            # signal may also end the wait after the turn was given: then it is not given again.
+            if not waiter.fired:
+                self.wake(waiter)
+                waiter.gate.acquire()
             raise
         self._raise_failure()
 
